@@ -44,7 +44,7 @@ def _magnetized_strip(cells: tuple[int, int], bending: str, beta: float) -> Aske
     mesh = ms.meshes.rectangle(*size, cells, irregular=0.25, order=order_of(bending))
     tip = mesh.vertices_at(x=magnetic_strip.LENGTH)
     rest = ms.equilibrium(
-        magnetic_strip.scene(mesh, bending), **magnetic_strip.controls(beta, (0.0, 0.0, 1.0))
+        magnetic_strip.scene(mesh, bending), **magnetic_strip.load_parameters(beta, (0.0, 0.0, 1.0))
     )
     exact = float(magnetic_strip.stretched_end(beta)[1])
     return Asked(rest, lambda rest: rest.positions[tip, 2].mean() / magnetic_strip.LENGTH, None, exact)

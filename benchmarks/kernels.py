@@ -96,31 +96,31 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 def cost(sheet: Sheet, faces: int, rounds: int) -> Cost:
     """Measure a square sheet near its rest shape, clamped at one side, with an irregular mesh."""
-    model, state, controls, n_faces, build = _near_rest(sheet, faces)
+    model, state, load_parameters, n_faces, build = _near_rest(sheet, faces)
     return Cost(
         n_faces,
         build,
-        measure(lambda: model.gradient(state, controls), rounds=rounds),
-        measure(lambda: model.assemble(state, controls), rounds=rounds),
+        measure(lambda: model.gradient(state, load_parameters), rounds=rounds),
+        measure(lambda: model.assemble(state, load_parameters), rounds=rounds),
         model.bytes,
     )
 
 
 def two_threads(sheet: Sheet, faces: int, rounds: int) -> float:
     """Return the speedup of gradient and Hessian by two threads, in wall-clock time."""
-    model, state, controls, *_ = _near_rest(sheet, faces)
+    model, state, load_parameters, *_ = _near_rest(sheet, faces)
     before, times = ms.num_threads(), []
     try:
         for count in (1, 2):
             ms.set_num_threads(count)
-            times.append(clocked(lambda: model.assemble(state, controls), rounds=rounds).wall)
+            times.append(clocked(lambda: model.assemble(state, load_parameters), rounds=rounds).wall)
     finally:
         ms.set_num_threads(before)
     return times[0] / times[1]
 
 
 def _near_rest(sheet: Sheet, faces: int):
-    """Return the core's model, a state, controls, the number of faces, and the time [s] to build the scene."""
+    """Return the core's model, a state, load parameters, the number of faces, and the time [s] to build the scene."""
     cells = max(1, round((faces / 2) ** 0.5))
     order = order_of(sheet.bending)
     mesh = ms.meshes.rectangle(1.0, 1.0, cells=(cells, cells), irregular=0.2, order=order)
@@ -146,11 +146,11 @@ def _near_rest(sheet: Sheet, faces: int):
         model.set_values(Values(scene, magnetization=magnetization).numbers)
     state = model.rest_state()
     state += 1e-3 / cells * np.random.default_rng(0).standard_normal(state.size)
-    controls = scene._control_layout.packed(
+    load_parameters = scene._load_parameter_layout.packed(
         {("scene", "applied_flux_density"): (0.0, 0.01, 0.02), ("scene", "gravity_factor"): 1.0},
-        scene._control_layout.zeros(),
+        scene._load_parameter_layout.zeros(),
     )
-    return model, state, controls, mesh.n_elements, build
+    return model, state, load_parameters, mesh.n_elements, build
 
 
 def _rows(name: str, costs: list[Cost]) -> list[list[str]]:

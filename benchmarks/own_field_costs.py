@@ -57,7 +57,7 @@ def pass_time(cells: int) -> float:
     with inputs.in_core():
         state = scene._model.rest_state()
         began = time.process_time()
-        scene._model.term_gradient("own field", state, inputs.controls)
+        scene._model.term_gradient("own field", state, inputs.load_parameters)
         return time.process_time() - began
 
 

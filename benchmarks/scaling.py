@@ -185,9 +185,9 @@ def _gradient(scene: ms.Scene, inputs: dict[str, Any], found: ms.Equilibrium, ro
     """Measure the gradient of a function of all positions by all inputs, from the stored factorization."""
     options = ms.MixedNewton()._options()
     options.keep_factor = True
-    state, turns, controls = found._state, found._angle_branches, found._controls
+    state, turns, load_parameters = found._state, found._angle_branches, found._load_parameters
     with Inputs(scene, **inputs, differentiable=True).in_core():
-        kept = _core.find_equilibrium(scene._model, state, turns, controls, controls, options)
+        kept = _core.find_equilibrium(scene._model, state, turns, load_parameters, load_parameters, options)
         by_positions = np.ones((scene.mesh.n_vertices, 3))
         by_rotations = np.zeros(scene.mesh.n_edges)
         return clocked(lambda: _core.pull_back(scene._model, kept, by_positions, by_rotations), rounds=rounds)
@@ -195,12 +195,12 @@ def _gradient(scene: ms.Scene, inputs: dict[str, Any], found: ms.Equilibrium, ro
 
 def linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> tuple[dict[str, Clocked], int]:
     """Measure each step of an iteration separately, at the equilibrium; also returns the number of entries of L."""
-    model, state, controls = scene._model, found._state, found._controls
-    n, starts, rows, values = model.hessian(state, controls)
+    model, state, load_parameters = scene._model, found._state, found._load_parameters
+    n, starts, rows, values = model.hessian(state, load_parameters)
     points = model.free_points
     factor, right = _core.analyze(n, starts, rows, points=points), np.ones(n)
     steps = {
-        "assembly": lambda: model.assemble(state, controls),
+        "assembly": lambda: model.assemble(state, load_parameters),
         "analysis": lambda: _core.analyze(n, starts, rows, points=points),
         "factorization": lambda: factor.factorize(values),
         "solve": lambda: factor.solve(right),
@@ -211,7 +211,7 @@ def linear_algebra(scene: ms.Scene, found: ms.Equilibrium, rounds: int) -> tuple
 def _orderings(scene: ms.Scene, found: ms.Equilibrium) -> tuple[dict[str, float], float | None]:
     """Return the operations of a factorization by each ordering, and the time [s] of METIS's analysis if it was
     built."""
-    n, starts, rows, _ = scene._model.hessian(found._state, found._controls)
+    n, starts, rows, _ = scene._model.hessian(found._state, found._load_parameters)
     points = scene._model.free_points
     operations = {
         name: _core.analyze(n, starts, rows, ordering=name, points=points).flops
@@ -226,7 +226,7 @@ def _core_limits(scene: ms.Scene, found: ms.Equilibrium) -> dict[str, Any] | Non
     """Return work, span and gains of a factorization; None in a build without MAGSHELL_TESTING."""
     if not hasattr(_core, "elimination_fronts"):
         return None
-    n, starts, rows, _ = scene._model.hessian(found._state, found._controls)
+    n, starts, rows, _ = scene._model.hessian(found._state, found._load_parameters)
     return core_limits.limits(_core.elimination_fronts(n, starts, rows, scene._model.free_points))
 
 

@@ -80,14 +80,14 @@ def measure(rounds: int, quick: bool) -> dict[str, Any]:
 
 def _costs(links: int, children: int, rounds: int) -> dict[str, Any]:
     scene = tree(links, children)
-    model, controls = scene._model, scene._control_layout.zeros()
+    model, load_parameters = scene._model, scene._load_parameter_layout.zeros()
     state = model.rest_state()
     step = clocked(lambda: _swing(scene), rounds=rounds).processor
     return {
         "links": links,
         "pairs": sum(_depth(k, children) for k in range(links)),
         "twists": clocked(lambda: model.linearize(state), rounds=rounds).processor,
-        "matrix": clocked(lambda: model.hessian(state, controls), rounds=rounds).processor,
+        "matrix": clocked(lambda: model.hessian(state, load_parameters), rounds=rounds).processor,
         "iteration": step / _swing(scene).iterations,
     }
 

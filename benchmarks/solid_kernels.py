@@ -81,7 +81,7 @@ def cost(
     solid = ms.Solid(ms.meshes.box((4.0, 1.0, 1.0), cells=cells), material=material, element=element)
     actuators = [] if muscle is None else [ms.Muscle(solid, (1.0, 0.2, 0.1), **muscle)]
     scene = ms.Scene(solid, supports=[ms.Pin(solid.mesh.vertices_at(x=0.0))], actuators=actuators)
-    model, controls = scene._model, scene._control_layout.zeros()
+    model, load_parameters = scene._model, scene._load_parameter_layout.zeros()
     state = model.rest_state()
     state += 1e-3 / cells[0] * np.random.default_rng(0).standard_normal(state.size)
     return {
@@ -89,6 +89,6 @@ def cost(
         "volume": volume,
         "tetrahedra": solid.mesh.n_tetrahedra,
         "unknowns": state.size,
-        "gradient": measure(lambda: model.gradient(state, controls), rounds=rounds).best,
-        "hessian": measure(lambda: model.assemble(state, controls), rounds=rounds).best,
+        "gradient": measure(lambda: model.gradient(state, load_parameters), rounds=rounds).best,
+        "hessian": measure(lambda: model.assemble(state, load_parameters), rounds=rounds).best,
     }

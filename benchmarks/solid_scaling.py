@@ -53,16 +53,16 @@ def costs(cells: tuple[int, int, int], rounds: int) -> dict[str, Any]:
     drive(beam((4, 1, 1)), 1)  # memory that any motion needs
     before = resident_memory()
     scene = beam(cells)
-    model, controls = scene._model, scene._control_layout.zeros()
+    model, load_parameters = scene._model, scene._load_parameter_layout.zeros()
     state = model.rest_state()
     move = drive(scene, 1)  # analyses the sparsity pattern
     step = clocked(lambda: drive(scene, 1), rounds=rounds)
     peak = peak_memory()
-    n, starts, rows, values = model.hessian(state, controls)
+    n, starts, rows, values = model.hessian(state, load_parameters)
     points = model.free_points
     factor, right = _core.analyze(n, starts, rows, points=points), np.ones(n)
     work = {
-        "assembly": lambda: model.assemble(state, controls),
+        "assembly": lambda: model.assemble(state, load_parameters),
         "analysis": lambda: _core.analyze(n, starts, rows, points=points),
         "factorization": lambda: factor.factorize(values),
         "solve": lambda: factor.solve(right),

@@ -23,7 +23,7 @@ ALLOWED_WORTH = (
 )
 ALLOWED_RATIO = 1.25  # [-] time of a Newton iteration over that of its factorization and back-substitution
 
-# {name: (scene for a kind of bending, controls, largest number of factorizations from flat in one call)}.
+# {name: (scene for a kind of bending, load parameters, largest number of factorizations from flat in one call)}.
 CASES: dict[str, tuple[Callable[[str], ms.Scene], dict[str, Any], int]] = {
     "A1, full load": (lambda b: shear_strip.scene(shear_strip.strip((40, 4), b), b), {}, 12),
     "A4, full load": (lambda b: hemisphere.scene(hemisphere.quarter((64, 16), b), b, 400.0), {}, 25),
@@ -34,7 +34,7 @@ CASES: dict[str, tuple[Callable[[str], ms.Scene], dict[str, Any], int]] = {
             ),
             b,
         ),
-        magnetic_strip.controls(20.0, (0.0, 0.0, 1.0)),
+        magnetic_strip.load_parameters(20.0, (0.0, 0.0, 1.0)),
         40,
     ),
 }
@@ -61,13 +61,13 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     faces = chosen(options.faces, options.quick, QUICK_FACES, FACES)
     if faces < 2:
         raise SystemExit("--faces must be at least 2")
-    scene, controls = strongly_bent(faces)
+    scene, load_parameters = strongly_bent(faces)
     from_flat = _from_flat()
     to_stable = _to_stable(options.quick)
-    iteration = _iteration(scene, controls, options.rounds)
-    threads = _threads(scene, controls, options.rounds)
-    backends = _backends(scene, controls, options.rounds)
-    worth = _worth(scene, controls, backends, options.rounds)
+    iteration = _iteration(scene, load_parameters, options.rounds)
+    threads = _threads(scene, load_parameters, options.rounds)
+    backends = _backends(scene, load_parameters, options.rounds)
+    worth = _worth(scene, load_parameters, backends, options.rounds)
     return {
         "faces": scene.mesh.n_faces,
         "from flat": from_flat,
@@ -90,11 +90,13 @@ def strongly_bent(faces: int, bending: str = "midedge") -> tuple[ms.Scene, dict[
 
 def _from_flat() -> dict[str, Any]:
     rows, results = [], {}
-    for name, (build, controls, allowed) in CASES.items():
+    for name, (build, load_parameters, allowed) in CASES.items():
         for bending in BENDINGS:
             for solver_name, solver in SOLVERS.items():
                 try:
-                    found = ms.equilibrium(build(bending), solver=solver, require_stable=False, **controls)
+                    found = ms.equilibrium(
+                        build(bending), solver=solver, require_stable=False, **load_parameters
+                    )
                 except ms.NotConverged as error:
                     found = error.last_good
                 bound = str(allowed) if (bending, solver_name) == ("midedge", "mixed") else ""
@@ -145,10 +147,10 @@ def semi_cylinder(
 def oblique_field(
     angle: float, beta: float, cells: tuple[int, int] = (10, 1)
 ) -> tuple[ms.Scene, dict[str, Any]]:
-    """Return case C1 with a field at an angle [degrees] to its magnetization, and the controls."""
+    """Return case C1 with a field at an angle [degrees] to its magnetization, and the load parameters."""
     mesh = ms.meshes.rectangle(magnetic_strip.LENGTH, magnetic_strip.WIDTH, cells=cells)
     direction = (np.cos(np.radians(angle)), 0.0, np.sin(np.radians(angle)))
-    return magnetic_strip.scene(mesh, "midedge"), magnetic_strip.controls(beta, direction)
+    return magnetic_strip.scene(mesh, "midedge"), magnetic_strip.load_parameters(beta, direction)
 
 
 def _to_stable(quick: bool) -> dict[str, Any]:
@@ -163,10 +165,10 @@ def _to_stable(quick: bool) -> dict[str, Any]:
         if cells == 8 or not quick
     ]
     rows, results = [], {}
-    for name, scene, controls, allowed in cases:
+    for name, scene, load_parameters, allowed in cases:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ms.LargeStrainWarning)
-            found = ms.equilibrium(scene, **controls)
+            found = ms.equilibrium(scene, **load_parameters)
         missed = note("count", f"factorizations of {name}, stable", found.factorizations, at_most=allowed)
         counts = [found.load_steps, found.relaxation_steps, found.saddles_escaped]
         rows.append([name, "", f"{found.factorizations}{missed}", *map(str, counts), str(allowed)])
@@ -184,9 +186,9 @@ def _to_stable(quick: bool) -> dict[str, Any]:
     return results
 
 
-def _iteration(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
+def _iteration(scene: ms.Scene, load_parameters: dict[str, Any], rounds: int) -> dict[str, Any]:
     """Measure the cost of an iteration over that of its linear algebra."""
-    runs = [ms.equilibrium(scene, **controls) for _ in range(rounds)]
+    runs = [ms.equilibrium(scene, **load_parameters) for _ in range(rounds)]
     best = min(runs, key=lambda run: run.wall_time)
     ratio = best.wall_time / best.linear_time
     memory = peak_memory()
@@ -208,14 +210,14 @@ def _iteration(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[s
     }
 
 
-def _threads(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
+def _threads(scene: ms.Scene, load_parameters: dict[str, Any], rounds: int) -> dict[str, Any]:
     """Compare times and bits on one thread and on two."""
     before = ms.num_threads()
     times, positions = {}, {}
     try:
         for count in (1, 2):
             ms.set_num_threads(count)
-            runs = [ms.equilibrium(scene, **controls) for _ in range(rounds)]
+            runs = [ms.equilibrium(scene, **load_parameters) for _ in range(rounds)]
             times[count] = min(run.wall_time for run in runs)
             positions[count] = runs[0].positions
     finally:
@@ -228,10 +230,10 @@ def _threads(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str
     return {"one thread": times[1], "two threads": times[2], "same bits": same}
 
 
-def _backends(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[str, Any]:
+def _backends(scene: ms.Scene, load_parameters: dict[str, Any], rounds: int) -> dict[str, Any]:
     """Measure the factorization of the bent sheet's Hessian by each backend."""
-    found = ms.equilibrium(scene, **controls)
-    n, starts, matrix_rows, values = scene._model.hessian(found._state, found._controls)
+    found = ms.equilibrium(scene, **load_parameters)
+    n, starts, matrix_rows, values = scene._model.hessian(found._state, found._load_parameters)
     points = scene._model.free_points
     right = np.random.default_rng(0).standard_normal(n)
     rows, results = [], {}
@@ -251,9 +253,9 @@ def _backends(scene: ms.Scene, controls: dict[str, Any], rounds: int) -> dict[st
     return results
 
 
-def _worth(scene: ms.Scene, controls: dict[str, Any], backends: dict[str, Any], rounds: int) -> float:
+def _worth(scene: ms.Scene, load_parameters: dict[str, Any], backends: dict[str, Any], rounds: int) -> float:
     """Measure the whole solve from flat over a factorization with back-substitution, in processor time."""
-    whole = clocked(lambda: ms.equilibrium(scene, **controls), rounds=rounds).processor
+    whole = clocked(lambda: ms.equilibrium(scene, **load_parameters), rounds=rounds).processor
     best = min(times["factorization"] + times["solve"] for times in backends.values())
     worth = whole / best
     missed = note("share", "from flat to strongly bent, in factorizations", worth, at_most=ALLOWED_WORTH)

@@ -110,8 +110,8 @@ def _costs(
     if of_rest is None:
         scene, solve, _ = _together(mesh, parts, moving=False)
         found = ms.equilibrium(scene, **solve)
-        model, state, controls = scene._model, found._state, found._controls
-        assembly = clocked(lambda: model.assemble(state, controls), rounds=rounds)
+        model, state, load_parameters = scene._model, found._state, found._load_parameters
+        assembly = clocked(lambda: model.assemble(state, load_parameters), rounds=rounds)
         whole = clocked(lambda: ms.equilibrium(scene, **solve), rounds=rounds)
         iteration = Clocked(*(seconds / found.factorizations for seconds in whole))
         of_rest = {

@@ -131,8 +131,8 @@ def field_across(
     mesh = _strip(magnetic_strip, cells, irregular)
     length, thickness = magnetic_strip.LENGTH, magnetic_strip.THICKNESS
     material = Material(thickness, magnetic_strip.YOUNG_MODULUS, 0.0)
-    controls = magnetic_strip.controls(beta, (0.0, 0.0, 1.0))
-    density = magnetic_strip.MAGNETIZATION * controls["applied_flux_density"][2]
+    load_parameters = magnetic_strip.load_parameters(beta, (0.0, 0.0, 1.0))
+    density = magnetic_strip.MAGNETIZATION * load_parameters["applied_flux_density"][2]
     other = netgen_mesh(mesh, _ends(length))
     u, seconds = _end(other, order, material, mesh, length, _in_a_field(thickness, density))
     x, y = magnetic_strip.ACROSS[beta]

@@ -68,7 +68,7 @@ def _strip(
     return ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, seed=seed, order=order_of(bending))
 
 
-def controls(beta: float, direction: tuple[float, float, float]) -> dict[str, Any]:
+def load_parameters(beta: float, direction: tuple[float, float, float]) -> dict[str, Any]:
     """Return the load parameters: magnetised along x, in the field [T] along `direction` that gives beta."""
     flux_density = beta * YOUNG_MODULUS * THICKNESS**2 / (12.0 * MAGNETIZATION * LENGTH**2)
     return {
@@ -111,7 +111,9 @@ def field_against(
 def _against_elastica(
     name: str, mesh, bending: str, references: dict[str, Any], direction, solver
 ) -> Outcome:
-    states = sweep(scene(mesh, bending), [controls(beta, direction) for beta in references], solver=solver)
+    states = sweep(
+        scene(mesh, bending), [load_parameters(beta, direction) for beta in references], solver=solver
+    )
     tips = np.array([tip(mesh, state.positions, x=LENGTH) for state in states]) / LENGTH
     x, y = np.array(list(references.values())).T
     at = [f"beta = {beta:g}" for beta in references]

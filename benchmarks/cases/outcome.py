@@ -104,11 +104,11 @@ def outcome(
     )
 
 
-def sweep(scene: ms.Scene, controls: Iterable[dict[str, Any]], **common: Any) -> list[ms.Equilibrium]:
-    """Solve for equilibria with one set of controls after the other, each from the one before and the first from
+def sweep(scene: ms.Scene, load_parameters: Iterable[dict[str, Any]], **common: Any) -> list[ms.Equilibrium]:
+    """Solve for equilibria with one set of load parameters after the other, each from the one before and the first from
     rest."""
     found: list[ms.Equilibrium] = []
-    for each in controls:
+    for each in load_parameters:
         found.append(ms.equilibrium(scene, start=found[-1] if found else None, **common, **each))
     return found
 

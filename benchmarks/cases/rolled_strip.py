@@ -41,8 +41,8 @@ def end_moment(
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells, irregular=irregular, order=order_of(bending))
     # Beyond 0.928 Mmax the plane arc is unstable and bends sideways (on finer meshes too); the closed form is that of
     # the plane arc.
-    controls = [{"load_factor": load} for load in loads]
-    states = sweep(scene(mesh, bending), controls, require_stable=False, solver=solver)
+    load_parameters = [{"load_factor": load} for load in loads]
+    states = sweep(scene(mesh, bending), load_parameters, require_stable=False, solver=solver)
     tips = np.array([tip(mesh, state.displacements, x=LENGTH) for state in states])
     references = np.array([exact(load) for load in loads])
     at = [f"M/Mmax = {load:g}" for load in loads]

@@ -76,9 +76,9 @@ def pulled_end(solid: ms.Solid, axis_value: float, force: ArrayLike) -> ms.Point
     return ms.PointLoad(vertices, weights[vertices, None] / weights.sum() * np.asarray(force, dtype=float))
 
 
-def solved(scene: ms.Scene, **controls: Any) -> tuple[ms.Equilibrium, float]:
+def solved(scene: ms.Scene, **load_parameters: Any) -> tuple[ms.Equilibrium, float]:
     began = time.process_time()
-    found = ms.equilibrium(scene, **controls)
+    found = ms.equilibrium(scene, **load_parameters)
     return found, time.process_time() - began
 
 
@@ -145,14 +145,14 @@ def magnetic_beam(cells: tuple[int, int, int], element: str) -> SolidOutcome:
     )
 
 
-def _bent(cells, element, references, acting, controls, **properties) -> SolidOutcome:
+def _bent(cells, element, references, acting, load_parameters, **properties) -> SolidOutcome:
     found, comparisons = [], []
     for poisson_ratio, (deflection, shortening) in references.items():
         material = ms.NeoHookean("isochoric", young_modulus=BEAM_MODULUS, poisson_ratio=poisson_ratio)
         mesh = ms.meshes.box((10, 1, 1), cells=cells, diagonals="crossed")
         solid = ms.Solid(mesh, material=material, element=element, **properties)
         scene = ms.Scene(solid, supports=[ms.Pin(at(solid, x=0.0))], **acting(solid))
-        found.append(solved(scene, **controls))
+        found.append(solved(scene, **load_parameters))
         end = at(solid, x=10.0)
         middle = end[np.argmin(np.linalg.norm(solid.mesh.rest_positions[end] - [10.0, 0.5, 0.5], axis=1))]
         moved = found[-1][0].displacements[middle]

@@ -84,10 +84,10 @@ void register_adjoint(py::module_& module) {
         "model "
         "must hold the values of that solve.");
     module.def(
-        "vjp", &residual_vjp, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("adjoint"),
+        "vjp", &residual_vjp, py::arg("model"), py::arg("q"), py::arg("load_parameters"), py::arg("adjoint"),
         py::arg("by_rest") = false,
         "adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the "
-        "controls; by_rest: also by the rest shape, three numbers per node, else none. What supports "
+        "load parameters; by_rest: also by the rest shape, three numbers per node, else none. What supports "
         "prescribe "
         "stays.");
     module.def(
@@ -95,10 +95,10 @@ void register_adjoint(py::module_& module) {
         "The rows of all vertices (n_v, 3) and directions (n_d, 3) of three numbers per node, or of all "
         "unknowns.");
     module.def(
-        "prescribed_vjp", &prescribed_vjp, py::arg("model"), py::arg("q"), py::arg("controls"),
+        "prescribed_vjp", &prescribed_vjp, py::arg("model"), py::arg("q"), py::arg("load_parameters"),
         py::arg("by_state"),
         "by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value and "
-        "(m,) by the controls. For scenes without rigid parts.");
+        "(m,) by the load parameters. For scenes without rigid parts.");
 }
 
 }  // namespace magshell::bindings

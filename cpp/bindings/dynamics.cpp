@@ -32,7 +32,7 @@ std::vector<LoadParameters> load_parameters_of(const Model& model, const TimeVar
                                                const Array& rows) {
     const Index width = model.parameters().registry().load_parameters.size() + varying.size();
     if (rows.ndim() != 2 || rows.shape(1) != width)
-        throw InvalidInput("controls must have one row per time point, of " + std::to_string(width) +
+        throw InvalidInput("load_parameters must have one row per time point, of " + std::to_string(width) +
                            " numbers");
     std::vector<LoadParameters> load_parameters;
     for (py::ssize_t k = 0; k < rows.shape(0); ++k)
@@ -90,7 +90,7 @@ AdaptiveSteps adaptive_of(const Model& model, const TimeVaryingParameters& varyi
     adaptive.intervals = given["intervals"].cast<Index>();
     adaptive.deepest = given["deepest"].cast<int>();
     adaptive.record_every = given["record_every"].cast<Index>();
-    const auto function = std::make_shared<py::object>(given["controls"]);
+    const auto function = std::make_shared<py::object>(given["load_parameters"]);
     adaptive.load_parameters = [&model, varying, function](Index interval, double begin, double end) {
         const py::gil_scoped_acquire locked;
         return load_parameters_of(model, varying, call_python(*function, interval, begin, end).cast<Array>());
@@ -130,7 +130,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.recorded = given["recorded"].cast<std::vector<Index>>();
     input.varying =
         TimeVaryingParameters(model.parameters().registry(), given["varying"].cast<std::vector<Index>>());
-    input.load_parameters = load_parameters_of(model, input.varying, array("controls"));
+    input.load_parameters = load_parameters_of(model, input.varying, array("load_parameters"));
     input.newton = given["newton"].cast<NewtonOptions>();
     if (const py::object projective = given["projective"]; !projective.is_none()) {
         const auto [iterations, tolerance, history, coulomb] =
@@ -254,7 +254,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     }
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
-    result["controls"] = rows_of(gradient.load_parameters);
+    result["load_parameters"] = rows_of(gradient.load_parameters);
     if (gradient.rest.asked)
         result["rest"] = py::make_tuple(at_nodes(model, gradient.rest.by_nodes),
                                         at_nodes(model, gradient.rest.by_prescribed));
@@ -296,7 +296,7 @@ MotionInputTangent input_tangent_of(const Model& model, const MotionInput& input
             if (found.is_none()) throw InvalidInput("beyond the range of a value");
             return found.cast<Model&>();
         };
-    along.load_parameters = load_parameters_of(model, input.varying, array("controls"));
+    along.load_parameters = load_parameters_of(model, input.varying, array("load_parameters"));
     along.positions = to_vector(array("state"));
     along.velocities = to_vector(array("velocity"));
     along.mass = model.bodies().vertex_weights(to_vector(array("mass")));

@@ -14,7 +14,7 @@ inline void check_load_parameters(const Model& model, const TimeVaryingParameter
                                   const LoadParameters& from, const LoadParameters& to) {
     const Index width = model.parameters().registry().load_parameters.size() + varying.size();
     if (from.size() != width || to.size() != width)
-        throw InvalidInput("controls must have shape (" + std::to_string(width) + ",)");
+        throw InvalidInput("load_parameters must have shape (" + std::to_string(width) + ",)");
 }
 
 }  // namespace magshell::bindings

@@ -159,8 +159,9 @@ void register_model(py::module_& module) {
             "parameters", [](const Model& m) { return entries_of(m.parameters().registry().values); },
             "(owner, name, unit, first, rows, width) of each, in the flat vector of set_values.")
         .def_property_readonly(
-            "controls", [](const Model& m) { return entries_of(m.parameters().registry().load_parameters); },
-            "Likewise, in the flat vectors of controls.")
+            "load_parameters",
+            [](const Model& m) { return entries_of(m.parameters().registry().load_parameters); },
+            "(owner, name, unit, first, rows, width) of each, in the flat vectors of load parameters.")
         .def(
             "set_values",
             [](Model& model, const Array& values) {
@@ -242,8 +243,9 @@ void register_model(py::module_& module) {
             [](const Model& m, const VectorXd& q, const LoadParameters& load_parameters) {
                 return m.dof_map().prescribed_increment(q, load_parameters);
             },
-            py::arg("q"), py::arg("controls"),
-            "How far from a state what motors and supports prescribe at these controls is, of all unknowns, "
+            py::arg("q"), py::arg("load_parameters"),
+            "How far from a state what motors and supports prescribe at these load parameters is, of all "
+            "unknowns, "
             "(n,); zero "
             "elsewhere.")
         .def(
@@ -262,7 +264,7 @@ void register_model(py::module_& module) {
                                })
         .def("energies", &energies)
         .def("term_energies", &term_energies, "[(name, J)] of each term, at a state with these turns.",
-             py::arg("q"), py::arg("turns"), py::arg("controls"))
+             py::arg("q"), py::arg("turns"), py::arg("load_parameters"))
         .def(
             "field_sampling_error",
             [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
@@ -272,7 +274,7 @@ void register_model(py::module_& module) {
                 return model.field_sampling_error(q, load_parameters);
             },
             "The estimate of find_equilibrium's result at a state, from samples of its own.", py::arg("q"),
-            py::arg("controls"), py::call_guard<py::gil_scoped_release>())
+            py::arg("load_parameters"), py::call_guard<py::gil_scoped_release>())
         .def(
             "refusal",
             [](const Model& model, const VectorXd& q) {
@@ -297,7 +299,7 @@ void register_model(py::module_& module) {
                 model.evaluate(q, load_parameters);
                 return model.dof_map().motor_forces(model.residual().gradient);
             },
-            py::arg("q"), py::arg("controls"), py::arg("turns"),
+            py::arg("q"), py::arg("load_parameters"), py::arg("turns"),
             "What the motors of joints do in an equilibrium q, N and N m, one after another.",
             py::call_guard<py::gil_scoped_release>())
         .def(
@@ -310,7 +312,7 @@ void register_model(py::module_& module) {
                 return model.dof_map().along_supports(model.residual().gradient);
             },
             "(3 m,) [N], with which supports pull at the held nodes of a scene at rest.", py::arg("q"),
-            py::arg("turns"), py::arg("controls"), py::call_guard<py::gil_scoped_release>())
+            py::arg("turns"), py::arg("load_parameters"), py::call_guard<py::gil_scoped_release>())
         .def(
             "assemble",
             [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
@@ -331,7 +333,8 @@ void register_model(py::module_& module) {
                 model.multiply(p, product);
                 return product;
             },
-            py::arg("q"), py::arg("controls"), py::arg("direction"), py::call_guard<py::gil_scoped_release>(),
+            py::arg("q"), py::arg("load_parameters"), py::arg("direction"),
+            py::call_guard<py::gil_scoped_release>(),
             "The product of the Hessian with a direction, of all unknowns (n,), with the own field.")
         .def(
             "rough_operator_product",
@@ -345,7 +348,8 @@ void register_model(py::module_& module) {
                         quick->add_rough_product(p, product);
                 return product;
             },
-            py::arg("q"), py::arg("controls"), py::arg("direction"), py::call_guard<py::gil_scoped_release>(),
+            py::arg("q"), py::arg("load_parameters"), py::arg("direction"),
+            py::call_guard<py::gil_scoped_release>(),
             "Nearly the product of the own field's Hessian with a direction, of all unknowns (n,), as solves "
             "with "
             "a large tolerance take it.")
@@ -356,7 +360,8 @@ void register_model(py::module_& module) {
                 const std::lock_guard lock(model.in_use());
                 return model.term_gradient(name, q, load_parameters);
             },
-            py::arg("name"), py::arg("q"), py::arg("controls"), py::call_guard<py::gil_scoped_release>(),
+            py::arg("name"), py::arg("q"), py::arg("load_parameters"),
+            py::call_guard<py::gil_scoped_release>(),
             "The gradient of the terms of one name, of all unknowns (n,) [N].")
         .def(
             "magnetic_moments",
@@ -369,7 +374,7 @@ void register_model(py::module_& module) {
                         in_field->add_moments(q.data(), load_parameters, points, moments);
                 return std::pair(rows_from(points), rows_from(moments));
             },
-            py::arg("name"), py::arg("q"), py::arg("controls"),
+            py::arg("name"), py::arg("q"), py::arg("load_parameters"),
             "Points [m] and magnetic moments [A m2] of the terms of one name, or of all of them, in the "
             "applied field, (n, 3) each.")
         .def(
@@ -421,7 +426,7 @@ void register_model(py::module_& module) {
             },
             py::arg("q"), py::call_guard<py::gil_scoped_release>(),
             "How nodes of links and rigid parts move, at a state: evaluations begin with it.")
-        .def("hessian", &hessian, py::arg("q"), py::arg("controls"), py::arg("reduced") = true)
+        .def("hessian", &hessian, py::arg("q"), py::arg("load_parameters"), py::arg("reduced") = true)
         .def(
             "small_deflection",
             [](Model& model, const VectorXd& q, const LoadParameters& unloaded,
@@ -429,11 +434,12 @@ void register_model(py::module_& module) {
                 const std::lock_guard lock(model.in_use());
                 return small_deflection(model, q, unloaded, load_parameters, at_rest);
             },
-            py::arg("q"), py::arg("unloaded"), py::arg("controls"), py::arg("at_rest") = py::none(),
+            py::arg("q"), py::arg("unloaded"), py::arg("load_parameters"), py::arg("at_rest") = py::none(),
             py::call_guard<py::gil_scoped_release>(),
-            "The motion from the rest shape q, of all unknowns, to first order in the controls. at_rest "
+            "The motion from the rest shape q, of all unknowns, to first order in the load parameters. "
+            "at_rest "
             "(n,): the "
-            "gradient there, unless it is that without controls.");
+            "gradient there, unless it is that without load parameters.");
 }
 
 }  // namespace magshell::bindings

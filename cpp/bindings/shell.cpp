@@ -42,7 +42,8 @@ py::list energies_of_elements(Model& model, const VectorXd& q, const LoadParamet
 }  // namespace
 
 void register_sheet(py::module_& module) {
-    module.def("element_energies", &energies_of_elements, py::arg("model"), py::arg("q"), py::arg("controls"),
+    module.def("element_energies", &energies_of_elements, py::arg("model"), py::arg("q"),
+               py::arg("load_parameters"),
                "[(name, whether of a solid, number of the sheet or solid, J of each element)] of the terms "
                "that are sums "
                "over elements, in the order of term_energies. Angles have no turns.");

@@ -140,7 +140,7 @@ void register_statics(py::module_& module) {
 
     py::class_<FailedAttempt>(module, "FailedAttempt")
         .def_readonly("state", &FailedAttempt::state)
-        .def_readonly("controls", &FailedAttempt::load_parameters)
+        .def_readonly("load_parameters", &FailedAttempt::load_parameters)
         .def_readonly("shortest_step", &FailedAttempt::shortest_step)
         .def_readonly("last_move", &FailedAttempt::last_displacement)
         .def_readonly("falling", &FailedAttempt::descent_direction);
@@ -159,7 +159,7 @@ void register_statics(py::module_& module) {
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
         .def_readonly("turns", &StaticsResult::angle_branches)
-        .def_readonly("controls", &StaticsResult::load_parameters)
+        .def_readonly("load_parameters", &StaticsResult::load_parameters)
         .def_readonly("load_fraction", &StaticsResult::progress)
         .def_readonly("reason", &StaticsResult::reason)
         .def_readonly("effort_spent", &StaticsResult::effort_spent)
@@ -188,14 +188,14 @@ void register_statics(py::module_& module) {
                py::arg("varying") = std::vector<Index>());
     module.def(
         "lowest_modes", &lowest_modes, py::arg("model"), py::arg("state"), py::arg("turns"),
-        py::arg("controls"), py::arg("count"), py::arg("progress") = py::none(),
+        py::arg("load_parameters"), py::arg("count"), py::arg("progress") = py::none(),
         "Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of "
         "unstable directions of an equilibrium; none where it is neutral.");
     module.def("moved", &moved, py::arg("model"), py::arg("state"), py::arg("step"),
                "A state after a step of all unknowns, as far as bodies in contact let it.");
     module.def("first_order_change", &change, py::arg("model"), py::arg("equilibrium"), py::arg("to"),
                "The change of the state to first order, from an equilibrium whose factor was kept to these "
-               "controls and the values that the model holds now.");
+               "load parameters and the values that the model holds now.");
     module.def(
         "push_forward", &change_along, py::arg("model"), py::arg("equilibrium"), py::arg("gradient_change"),
         py::arg("prescribed_change"), py::arg("moved") = VectorXd(), py::arg("forces") = VectorXd(),
@@ -204,7 +204,8 @@ void register_statics(py::module_& module) {
         "them, and "
         "the fixed gradient on the free unknowns there. The model must hold the values of that solve.");
     module.def(
-        "state_on_joints", &carried, py::arg("model"), py::arg("q"), py::arg("controls"), py::arg("forces"),
+        "state_on_joints", &carried, py::arg("model"), py::arg("q"), py::arg("load_parameters"),
+        py::arg("forces"),
         "A state with its rigid parts on their joints as the values are now, the increments from there to "
         "what motors and supports prescribe, and forces of all unknowns on the free ones there.");
 }

@@ -31,12 +31,12 @@ class Beam:
     shortening: float
 
     def equilibrium(self, field=0.0, **options) -> ms.Equilibrium:
-        return ms.equilibrium(self.scene, **self._controls(field), **options)
+        return ms.equilibrium(self.scene, **self._inputs(field), **options)
 
     def follow(self, field, **options) -> ms.EquilibriumPath:
-        return ms.follow_path(self.scene, **self._controls(field), progress=False, **options)
+        return ms.follow_path(self.scene, **self._inputs(field), progress=False, **options)
 
-    def _controls(self, field):
+    def _inputs(self, field):
         return {"remanent_magnetization": self.remanent_magnetization, "applied_flux_density": (0, 0, field)}
 
     def height(self, positions) -> float:

@@ -82,14 +82,14 @@ def of_finer_magnetizations(cells, divisions=((5, 1), (10, 1), (5, 3))) -> list[
         finest = sheet(cells).regions
         magnetization = np.empty((whole.n_regions, 3))
         magnetization[whole.regions] = true_magnetization()[finest]
-        controls = {"applied_flux_density": FIELDS}
-        base = ms.equilibrium(whole.scene, remanent_magnetization=magnetization[whole.regions], **controls)
+        loads = {"applied_flux_density": FIELDS}
+        base = ms.equilibrium(whole.scene, remanent_magnetization=magnetization[whole.regions], **loads)
         columns = []
         for k in range(magnetization.size):
             moved = magnetization.copy()
             moved.flat[k] += 500.0
             there = ms.equilibrium(
-                whole.scene, remanent_magnetization=moved[whole.regions], start=base, **controls
+                whole.scene, remanent_magnetization=moved[whole.regions], start=base, **loads
             )
             columns.append((there.positions - base.positions).ravel() / (500.0 * NOISE))
         sensitivity = np.stack(columns, axis=1)

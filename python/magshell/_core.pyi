@@ -399,15 +399,15 @@ class Model:
     def driven_increment(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
-        How far from a state what motors and supports prescribe at these controls is, of all unknowns, (n,); zero elsewhere.
+        How far from a state what motors and supports prescribe at these load parameters is, of all unknowns, (n,); zero elsewhere.
         """
     def driving(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         turns: collections.abc.Sequence[
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
         ],
@@ -434,7 +434,7 @@ class Model:
     def field_sampling_error(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> float:
         """
         The estimate of find_equilibrium's result at a state, from samples of its own.
@@ -468,7 +468,7 @@ class Model:
         turns: collections.abc.Sequence[
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
         ],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         (3 m,) [N], with which supports pull at the held nodes of a scene at rest.
@@ -476,13 +476,13 @@ class Model:
     def hessian(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple[typing.Any, ...]: ...
     def hessian_product(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
@@ -510,7 +510,7 @@ class Model:
         self,
         name: str,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> tuple[
         typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
         typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
@@ -573,7 +573,7 @@ class Model:
     def rough_operator_product(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         direction: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
@@ -595,11 +595,11 @@ class Model:
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         unloaded: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         at_rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None = None,
     ) -> SmallDeflection:
         """
-        The motion from the rest shape q, of all unknowns, to first order in the controls. at_rest (n,): the gradient there, unless it is that without controls.
+        The motion from the rest shape q, of all unknowns, to first order in the load parameters. at_rest (n,): the gradient there, unless it is that without load parameters.
         """
     def state(
         self,
@@ -612,7 +612,7 @@ class Model:
         turns: collections.abc.Sequence[
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
         ],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> list[typing.Any]:
         """
         [(name, J)] of each term, at a state with these turns.
@@ -621,7 +621,7 @@ class Model:
         self,
         name: str,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
         """
         The gradient of the terms of one name, of all unknowns (n,) [N].
@@ -631,17 +631,17 @@ class Model:
     @property
     def bytes(self) -> int: ...
     @property
-    def controls(self) -> list[typing.Any]:
-        """
-        Likewise, in the flat vectors of controls.
-        """
-    @property
     def free_points(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
         """
         Where each free unknown is at rest (n, 3) [m]: its vertex, or the middle of its edge.
         """
     @property
     def free_size(self) -> int: ...
+    @property
+    def load_parameters(self) -> list[typing.Any]:
+        """
+        (owner, name, unit, first, rows, width) of each, in the flat vectors of load parameters.
+        """
     @property
     def n_strains(self) -> int: ...
     @property
@@ -752,11 +752,11 @@ class Outcome:
 
 class FailedAttempt:
     @property
-    def controls(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
     def falling(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def last_move(self) -> float: ...
+    @property
+    def load_parameters(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def shortest_step(self) -> float: ...
     @property
@@ -790,8 +790,6 @@ class StaticsResult:
     @property
     def bytes(self) -> int: ...
     @property
-    def controls(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
     def effort_spent(self) -> bool: ...
     @property
     def factorization(self) -> str: ...
@@ -809,6 +807,8 @@ class StaticsResult:
     def linear_time(self) -> float: ...
     @property
     def load_fraction(self) -> float: ...
+    @property
+    def load_parameters(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def load_steps(self) -> int: ...
     @property
@@ -1146,7 +1146,7 @@ def drag_gradients(
 def element_energies(
     model: Model,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> list[typing.Any]:
     """
     [(name, whether of a solid, number of the sheet or solid, J of each element)] of the terms that are sums over elements, in the order of term_energies. Angles have no turns.
@@ -1195,7 +1195,7 @@ def first_order_change(
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
-    The change of the state to first order, from an equilibrium whose factor was kept to these controls and the values that the model holds now.
+    The change of the state to first order, from an equilibrium whose factor was kept to these load parameters and the values that the model holds now.
     """
 
 def follow_path(
@@ -1231,7 +1231,7 @@ def lowest_modes(
     model: Model,
     state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
-    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     count: typing.SupportsInt | typing.SupportsIndex,
     progress: typing.Any = None,
 ) -> tuple[typing.Any, ...]:
@@ -1330,11 +1330,11 @@ def pair_sums(
 def prescribed_vjp(
     model: Model,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     by_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> tuple[typing.Any, ...]:
     """
-    by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value and (m,) by the controls. For scenes without rigid parts.
+    by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value and (m,) by the load parameters. For scenes without rigid parts.
     """
 
 def pull_back(
@@ -1467,7 +1467,7 @@ def solve_with_operator(
 def state_on_joints(
     model: Model,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     forces: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> tuple[typing.Any, ...]:
     """
@@ -1486,12 +1486,12 @@ def touching_pairs(
 def vjp(
     model: Model,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    controls: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     adjoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     by_rest: bool = False,
 ) -> tuple[typing.Any, ...]:
     """
-    adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the controls; by_rest: also by the rest shape, three numbers per node, else none. What supports prescribe stays.
+    adjoint . dg/dk at a state q, g the gradient of the energy: (n,) by every value and (m,) by the load parameters; by_rest: also by the rest shape, three numbers per node, else none. What supports prescribe stays.
     """
 
 def without_rest_gradient(model: Model) -> list[typing.Any]:

@@ -283,7 +283,7 @@ def test_span_of_fronts_known_by_hand() -> None:
 def test_fronts_of_a_matrix_hold_all_its_operations() -> None:
     scene, inputs = strongly_bent(512, "midedge")
     found = ms.equilibrium(scene, **inputs)
-    n, starts, rows, _ = scene._model.hessian(found._state, found._controls)
+    n, starts, rows, _ = scene._model.hessian(found._state, found._load_parameters)
     points = scene._model.free_points
     fronts = _core.elimination_fronts(n, starts, rows, points)
     assert fronts["pivots"].sum() == n and fronts["parent"][-1] == -1

@@ -86,8 +86,8 @@ CASES = [(name, element) for name in KINDS for element in ("linear", "quadratic"
 CASES.remove(("liquid in a sheet", "linear"))
 
 
-def controls(scene, load_factor: float) -> np.ndarray:
-    layout = scene._control_layout
+def load_parameters(scene, load_factor: float) -> np.ndarray:
+    layout = scene._load_parameter_layout
     return layout.packed({("scene", "load_factor"): load_factor}, layout.zeros())
 
 
@@ -106,7 +106,7 @@ def test_energy_gradient_and_hessian_are_those_of_torch(name, element):
     scene = KINDS[name](element)
     model, x = scene._model, moved(scene)
     state = model.state(x, np.zeros(scene.mesh.n_edges))
-    on, off = controls(scene, 0.7), controls(scene, 0.0)
+    on, off = load_parameters(scene, 0.7), load_parameters(scene, 0.0)
 
     def by_torch(flat):
         points = flat.reshape(-1, 3)
@@ -143,14 +143,15 @@ def test_actuators_exert_no_net_force_and_no_net_torque(name, element):
     model, x = scene._model, moved(scene)
     state = model.state(x, np.zeros(scene.mesh.n_edges))
     forces = model.positions(
-        model.gradient(state, controls(scene, 1.0)) - model.gradient(state, controls(scene, 0.0))
+        model.gradient(state, load_parameters(scene, 1.0))
+        - model.gradient(state, load_parameters(scene, 0.0))
     )
     size = np.abs(forces).sum()
     assert np.abs(forces.sum(axis=0)).max() < 1e-13 * size
     assert np.abs(np.cross(x - x.mean(axis=0), forces).sum(axis=0)).max() < 1e-13 * size * np.ptp(x)
     turn = Rotation.from_rotvec((0.3, -0.5, 0.2)).as_matrix()
     turned = model.state(x @ turn.T + (1, 2, 3), np.zeros(scene.mesh.n_edges))
-    on = controls(scene, 1.0)
+    on = load_parameters(scene, 1.0)
     energies = [model.energies(at, on) for at in (state, turned)]
     for term in ("volume", "tendons"):
         if term in energies[0]:
@@ -160,7 +161,7 @@ def test_actuators_exert_no_net_force_and_no_net_torque(name, element):
 def test_large_cells_are_bordered_and_small_ones_are_not():
     scene = few_and_large_cells("quadratic")
     model = scene._model
-    model.hessian(model.rest_state(), controls(scene, 1.0))
+    model.hessian(model.rest_state(), load_parameters(scene, 1.0))
     columns, stiffness = model.low_rank()
     assert columns.shape == (scene.n_dofs, 1) and stiffness.shape == (1,)
 
@@ -177,7 +178,7 @@ def test_a_pressure_in_a_closed_solid_is_that_of_ms_pressure():
     gradients, hessians = [], []
     for scene in scenes:
         state = scene._model.state(moved(scene), np.zeros(scene.mesh.n_edges))
-        gradients.append(scene._model.gradient(state, controls(scene, 1.0)))
-        hessians.append(scene._model.hessian(state, controls(scene, 1.0))[3])
+        gradients.append(scene._model.gradient(state, load_parameters(scene, 1.0)))
+        hessians.append(scene._model.hessian(state, load_parameters(scene, 1.0))[3])
     assert np.allclose(*gradients, rtol=0, atol=1e-12 * np.abs(gradients[0]).max())
     assert np.allclose(*hessians, rtol=0, atol=1e-12 * np.abs(hessians[0]).max())

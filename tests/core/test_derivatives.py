@@ -6,7 +6,7 @@ are far from rest: stretched, compressed, and folded to within a tenth of a degr
 
 import numpy as np
 import pytest
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 
 import magshell as ms
 from magshell.model.supports.supports import rotation_matrix
@@ -39,7 +39,7 @@ def shell(mesh, thickness=0.02, **options):
 def elastic(thickness, bending):
     def build(size):
         scene = ms.Scene(shell(curved_mesh(size), thickness, bending=bending), allow_rigid_motions=True)
-        return Problem(scene, Controls())
+        return Problem(scene, LoadParameters())
 
     return build
 
@@ -65,7 +65,7 @@ def capped(thickness):
     def build(size):
         scene = ms.Scene(shell(capped_mesh(size), thickness), allow_rigid_motions=True)
         assert len(scene._model.recut_faces) == 4
-        return Problem(scene, Controls())
+        return Problem(scene, LoadParameters())
 
     return build
 
@@ -75,12 +75,12 @@ def soft(mesh, **options):
     return ms.Shell(mesh, thickness=1e-2 * mesh.size, young_modulus=1e-9, **options)
 
 
-def magnetic(field, magnetization, controls, law="stretches"):
+def magnetic(field, magnetization, load_parameters, law="stretches"):
     def build(size):
         source = field(size)
         sheet = soft(curved_mesh(size), magnetization_law=law)
         scene = ms.Scene(sheet, field=source, allow_rigid_motions=True)
-        return Problem(scene, controls, np.array(MAGNETIZATION[magnetization]))
+        return Problem(scene, load_parameters, np.array(MAGNETIZATION[magnetization]))
 
     return build
 
@@ -119,7 +119,7 @@ def gravity(size):
     scene = ms.Scene(
         soft(flat_mesh(size), mass_density=1e3), gravity=(1.0, -2.0, -9.81), allow_rigid_motions=True
     )
-    return Problem(scene, Controls(gravity_factor=0.7))
+    return Problem(scene, LoadParameters(gravity_factor=0.7))
 
 
 def loads(size):
@@ -129,7 +129,9 @@ def loads(size):
         ms.EdgeLoad(mesh.edges_at(x=size), (0.4, -0.3, 2.0)),
         ms.AreaLoad((0.0, 0.7, -1.0), faces=[1, 3, 4]),
     ]
-    return Problem(ms.Scene(soft(mesh), loads=acting, allow_rigid_motions=True), Controls(load_factor=1.3))
+    return Problem(
+        ms.Scene(soft(mesh), loads=acting, allow_rigid_motions=True), LoadParameters(load_factor=1.3)
+    )
 
 
 def edge_moment(bending):
@@ -139,7 +141,7 @@ def edge_moment(bending):
         scene = ms.Scene(
             soft(mesh, bending=bending), loads=[ms.EdgeCouple(ends, 0.8)], allow_rigid_motions=True
         )
-        return Problem(scene, Controls(load_factor=1.0))
+        return Problem(scene, LoadParameters(load_factor=1.0))
 
     return build
 
@@ -149,7 +151,7 @@ def clamped(size):
     inner = mesh.edges_between(mesh.vertices_where(lambda x: np.abs(x[:, 0] - 0.5 * size) < 0.13 * size))
     supports = [ms.Clamp(mesh.edges_at(x=0.0), rotation=(0.0, 1.0, 0.0)), ms.Clamp(inner[:1])]
     scene = ms.Scene(shell(mesh, 10.0), supports=supports)
-    return Problem(scene, Controls(support_factor=0.5))
+    return Problem(scene, LoadParameters(support_factor=0.5))
 
 
 def turned(mesh):
@@ -163,13 +165,15 @@ def oblique_symmetry(size):
     rotation = turned(mesh)
     supports = [ms.SymmetryPlane(rotation @ (1, 0, 0)), ms.SymmetryPlane(rotation @ (0, 1, 0))]
     scene = ms.Scene(shell(mesh.transformed(rotation), 0.1), supports=supports, allow_rigid_motions=True)
-    return Problem(scene, Controls())
+    return Problem(scene, LoadParameters())
 
 
 def scaled_curvature(size):
     mesh = curved_mesh(size)
     scale = np.random.default_rng(5).uniform(0.3, 3.0, mesh.n_edges)
-    return Problem(ms.Scene(shell(mesh, 10.0, curvature_scale=scale), allow_rigid_motions=True), Controls())
+    return Problem(
+        ms.Scene(shell(mesh, 10.0, curvature_scale=scale), allow_rigid_motions=True), LoadParameters()
+    )
 
 
 def patchwork(size):
@@ -181,12 +185,12 @@ def patchwork(size):
         young_modulus=draw(1e5, 1e7, mesh.n_faces),
         poisson_ratio=draw(-0.9, 0.5, mesh.n_faces),
     )
-    return Problem(ms.Scene(sheet, allow_rigid_motions=True), Controls())
+    return Problem(ms.Scene(sheet, allow_rigid_motions=True), LoadParameters())
 
 
-IN_FIELD = Controls(applied_flux_density=np.array(FIELD))
-IN_SOURCES = Controls(applied_flux_density=np.zeros(3), field_factor=1.0)
-IN_BOTH = Controls(applied_flux_density=np.array(FIELD), field_factor=0.8)
+IN_FIELD = LoadParameters(applied_flux_density=np.array(FIELD))
+IN_SOURCES = LoadParameters(applied_flux_density=np.zeros(3), field_factor=1.0)
+IN_BOTH = LoadParameters(applied_flux_density=np.array(FIELD), field_factor=0.8)
 
 # name -> (builder for a given size, the term that must have nearly all of the energy, or None)
 TERMS = {
@@ -356,7 +360,7 @@ def test_tested_term_dominates_the_energy(term, rng):
     """Check that one term dominates the energy; otherwise the derivatives of others would hide an error in it."""
     build, carrier = TERMS[term]
     problem = build(1.0)
-    energies = problem.model.energies(bent(problem, rng), problem.controls)
+    energies = problem.model.energies(bent(problem, rng), problem.load_parameters)
     rest = sum(abs(value) for name, value in energies.items() if name != carrier)
     assert abs(energies[carrier]) > 50.0 * rest
 

@@ -6,7 +6,7 @@ face normals, and the magnetic energy from a matrix inverse, as in the paper.
 
 import numpy as np
 import pytest
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 
 import magshell as ms
 
@@ -40,7 +40,7 @@ def make_problem(bending, dominant_term):
     clamped = np.concatenate([mesh.edges_at(x=0.0), mesh.edges_at(x=1.0)[:1]])
     scene = ms.Scene(sheet, supports=[ms.Clamp(clamped)], field=ms.UniformField())
     return Problem(
-        scene, Controls(applied_flux_density=np.array(FLUX_DENSITY)), np.array(MAGNETIZATION)
+        scene, LoadParameters(applied_flux_density=np.array(FLUX_DENSITY)), np.array(MAGNETIZATION)
     ), clamped
 
 
@@ -189,7 +189,7 @@ def test_energies_gradients_and_hessians_agree_with_torch(dominant_term, bending
     z, q = deformed(problem, rng)
     z = torch.tensor(z, requires_grad=True)
 
-    energies = problem.model.energies(q, problem.controls)
+    energies = problem.model.energies(q, problem.load_parameters)
     for name in CARRIERS:
         assert energies[name] == pytest.approx(getattr(formulas, name)(z).item(), rel=1e-12)
         assert name == dominant_term or abs(energies[name]) < 1e-2 * abs(energies[dominant_term])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 
 import magshell as ms
 from magshell.model.supports.supports import rotation_matrix
@@ -63,7 +63,7 @@ def random_state(problem, rng):
 
 def free_sheet(mesh, bending):
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, bending=bending)
-    return Problem(ms.Scene(sheet, allow_rigid_motions=True), Controls())
+    return Problem(ms.Scene(sheet, allow_rigid_motions=True), LoadParameters())
 
 
 # Rigid motions
@@ -211,13 +211,15 @@ def test_any_number_of_threads_gives_the_same_bits(bending, thread_counts, rng):
     field = [ms.UniformField(), ms.Dipoles([[0.05, 0.0, 0.1]], [[0.0, 0.0, 5.0]])]
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, bending=bending)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=field)
-    problem = Problem(scene, Controls(applied_flux_density=FLUX_DENSITY, field_factor=1.0), MAGNETIZATION)
+    problem = Problem(
+        scene, LoadParameters(applied_flux_density=FLUX_DENSITY, field_factor=1.0), MAGNETIZATION
+    )
     q = problem.model.state(*random_state(problem, rng))
     seen = set()
     for count in (*thread_counts, 1):
         ms.set_num_threads(count)
         found = at_rest(scene)
-        values = problem.model.hessian(q, problem.controls)[3]
+        values = problem.model.hessian(q, problem.load_parameters)[3]
         parts = (
             np.float64(problem.energy(q)),
             problem.gradient(q),
@@ -238,12 +240,14 @@ def test_any_number_of_threads_gives_the_same_bits_on_a_large_sheet(thread_count
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(110, 110), irregular=0.2)  # more parts than a stretch holds
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
-    problem = Problem(scene, Controls(applied_flux_density=FLUX_DENSITY, field_factor=1.0), MAGNETIZATION)
+    problem = Problem(
+        scene, LoadParameters(applied_flux_density=FLUX_DENSITY, field_factor=1.0), MAGNETIZATION
+    )
     q = problem.model.state(*random_state(problem, rng))
     seen = set()
     for count in thread_counts:
         ms.set_num_threads(count)
-        parts = problem.gradient(q), problem.model.hessian(q, problem.controls)[3]
+        parts = problem.gradient(q), problem.model.hessian(q, problem.load_parameters)[3]
         seen.add(tuple(part.tobytes() for part in parts))
     assert len(seen) == 1
 

@@ -7,7 +7,7 @@ as for tetrahedra.
 import numpy as np
 import pytest
 from magnet_forces import VACUUM_PERMEABILITY
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 
 import magshell as ms
 
@@ -173,8 +173,8 @@ CASES = {
 def test_energy_gradient_and_hessian_of_each_law_agree_with_torch(case, law, rng):
     body, formulas = CASES[case](law)
     scene = ms.Scene(body, field=[ms.UniformField(), ms.Dipoles(AT, MOMENTS)], allow_rigid_motions=True)
-    controls = Controls(applied_flux_density=tuple(FLUX_DENSITY), field_factor=1.0)
-    problem = Problem(scene, controls)
+    load_parameters = LoadParameters(applied_flux_density=tuple(FLUX_DENSITY), field_factor=1.0)
+    problem = Problem(scene, load_parameters)
     scene._model.set_values(scene._values.numbers)
     n = scene.mesh.n_vertices
     strain = np.diag([1.3, 0.75, 1.1]) + 0.15 * rng.normal(size=(3, 3))
@@ -189,7 +189,7 @@ def test_energy_gradient_and_hessian_of_each_law_agree_with_torch(case, law, rng
         return formulas.energy(law, positions.reshape(-1, 3))
 
     expected = total(at).item()
-    assert scene._model.energies(q, problem.controls)["magnetic"] == pytest.approx(expected, rel=1e-9)
+    assert scene._model.energies(q, problem.load_parameters)["magnetic"] == pytest.approx(expected, rel=1e-9)
     gradient = np.zeros(3 * n)
     gradient[order[known]] = problem.gradient(q)[known]
     by = torch.autograd.functional.jacobian(total, at.reshape(-1)).numpy()

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 
 import magshell as ms
 
@@ -169,6 +169,6 @@ def test_zero_energy_modes_of_isochoric_material_are_counted(mesh, free):
     assert len(said) == (free > 0) and all(f"has {free} shape" in text for text in said)
     for each, count in ((solid, 6 + free), (ms.Solid(mesh, material=SOFT), 6)):
         scene = ms.Scene(each, allow_rigid_motions=True)
-        hessian = Problem(scene, Controls()).hessian(scene._model.rest_state())
+        hessian = Problem(scene, LoadParameters()).hessian(scene._model.rest_state())
         values = np.linalg.eigvalsh(hessian.toarray() if hasattr(hessian, "toarray") else hessian)
         assert (np.abs(values) < 1e-9 * values.max()).sum() == count

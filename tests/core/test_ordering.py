@@ -12,7 +12,7 @@ def pattern_of(mesh: ms.TriangleMesh, bending: str) -> tuple[tuple, np.ndarray]:
     """Return (size, column starts, rows) of a sheet clamped at a border edge, and the points of its unknowns."""
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, bending=bending)
     scene = ms.Scene(sheet, supports=[ms.Clamp(np.flatnonzero((mesh.edge_faces < 0).any(axis=1))[:1])])
-    *pattern, _ = scene._model.hessian(scene._model.rest_state(), scene._control_layout.zeros())
+    *pattern, _ = scene._model.hessian(scene._model.rest_state(), scene._load_parameter_layout.zeros())
     return tuple(pattern), scene._model.free_points
 
 
@@ -103,7 +103,7 @@ def pattern_of_solid(mesh: ms.TetMesh, held: float = 0.05) -> tuple[tuple, np.nd
     solid = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3))
     x = solid.mesh.rest_positions[:, 0]
     scene = ms.Scene(solid, supports=[ms.Pin(np.flatnonzero(x <= x.min() + held * np.ptp(x)))])
-    *pattern, _ = scene._model.hessian(scene._model.rest_state(), scene._control_layout.zeros())
+    *pattern, _ = scene._model.hessian(scene._model.rest_state(), scene._load_parameter_layout.zeros())
     return tuple(pattern), scene._model.free_points
 
 

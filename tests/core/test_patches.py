@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from directors import directors
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 
 import magshell as ms
 from magshell.model.supports.supports import continuations, rotation_matrix
@@ -18,7 +18,7 @@ def sheet(cells=(6, 4), length=0.3, width=0.2, **options):
 
 
 def free(shell):
-    return Problem(ms.Scene(shell, allow_rigid_motions=True), Controls())
+    return Problem(ms.Scene(shell, allow_rigid_motions=True), LoadParameters())
 
 
 def plane_stress(strain, nu):
@@ -39,7 +39,7 @@ def test_uniform_stretch_has_the_energy_of_plane_stress(nu, bending):
     positions[:, :2] = mesh.rest_positions[:, :2] @ stretch.T
     q = problem.model.state(positions @ OBLIQUE.T + (0.1, 0.2, 0.3), np.zeros(mesh.n_edges))
     green = 0.5 * (stretch.T @ stretch - np.eye(2))
-    energies = problem.model.energies(q, problem.controls)
+    energies = problem.model.energies(q, problem.load_parameters)
     expected = 0.5 * YOUNG * THICKNESS * 0.3 * 0.2 * plane_stress(green, nu)
     assert energies["membrane"] == pytest.approx(expected, rel=1e-12)
     assert energies["bending"] < 1e-20
@@ -82,7 +82,7 @@ def test_uniform_curvature_has_the_energy_of_a_plate(shape, nu):
     q = problem.model.state(positions, directors(mesh, positions, normals))
     stiffness = YOUNG * THICKNESS**3 / 12.0
     expected = 0.5 * stiffness * 0.3 * 0.2 * plane_stress(curvature, nu)
-    assert problem.model.energies(q, problem.controls)["bending"] == pytest.approx(expected, rel=1e-6)
+    assert problem.model.energies(q, problem.load_parameters)["bending"] == pytest.approx(expected, rel=1e-6)
     inner = mesh.interior_edges
     moments = problem.model.edge_rotations(problem.gradient(q))
     largest = stiffness * np.abs(curvature).max() * mesh.edge_lengths.max()
@@ -105,7 +105,7 @@ def test_a_rolled_sheet_has_the_energy_of_a_cylinder(nu):
         angle = mesh.edge_midpoints[:, 0] / radius
         normals = np.column_stack([-np.sin(angle), np.zeros_like(angle), np.cos(angle)])
         q = problem.model.state(positions, directors(mesh, positions, normals))
-        errors.append(abs(problem.model.energies(q, problem.controls)["bending"] / exact - 1.0))
+        errors.append(abs(problem.model.energies(q, problem.load_parameters)["bending"] / exact - 1.0))
     assert errors[-1] < 2e-3
     assert errors[1] < errors[0] / 3.0 and errors[2] < errors[1] / 3.0
 
@@ -130,7 +130,9 @@ def test_a_tangential_magnetization_pulls_at_the_boundary_only(rotation, rng):
     mesh = sheet().mesh.transformed(rotation)
     shell = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e-12)
     scene = ms.Scene(shell, field=ms.UniformField(), allow_rigid_motions=True)
-    problem = Problem(scene, Controls(applied_flux_density=rotation @ FLUX_DENSITY), rotation @ TANGENTIAL)
+    problem = Problem(
+        scene, LoadParameters(applied_flux_density=rotation @ FLUX_DENSITY), rotation @ TANGENTIAL
+    )
     expected = ms.EdgeLoad(*edge_traction(mesh, rotation)).vertex_forces(mesh)
     scale = np.abs(expected).max()
     inside = np.setdiff1d(np.arange(mesh.n_vertices), mesh.boundary_vertices)
@@ -203,11 +205,11 @@ def test_loads_have_the_stated_resultants():
     scene = ms.Scene(
         shell, loads=[load for load, _ in totals.values()], gravity=(0, 0, -9.81), allow_rigid_motions=True
     )
-    problem = Problem(scene, Controls(load_factor=1.0, gravity_factor=1.0))
+    problem = Problem(scene, LoadParameters(load_factor=1.0, gravity_factor=1.0))
     way = np.array([0.1, 0.2, -0.3])
     before, after = (
         problem.model.energies(
-            problem.model.state(mesh.rest_positions + shift, np.zeros(mesh.n_edges)), problem.controls
+            problem.model.state(mesh.rest_positions + shift, np.zeros(mesh.n_edges)), problem.load_parameters
         )
         for shift in (np.zeros(3), way)
     )

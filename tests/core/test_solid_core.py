@@ -152,7 +152,11 @@ def test_same_bits_on_any_number_of_threads(material, element):
         for threads in (1, 2, 3):
             ms.set_num_threads(threads)
             seen.append(
-                (model.energy(x), model.gradient(x), model.core.hessian(model.state(x), model.controls)[3])
+                (
+                    model.energy(x),
+                    model.gradient(x),
+                    model.core.hessian(model.state(x), model.load_parameters)[3],
+                )
             )
     finally:
         ms.set_num_threads(before)

@@ -207,7 +207,9 @@ def test_kept_factors_share_their_work_space():
         adjoint_storage="factors",
         progress=False,
     )
-    n, starts, rows, values = scene._model.hessian(scene._model.rest_state(), scene._control_layout.zeros())
+    n, starts, rows, values = scene._model.hessian(
+        scene._model.rest_state(), scene._load_parameter_layout.zeros()
+    )
     one = _core.analyze(n, starts, rows)
     one.factorize(values)
     assert move.bytes < 0.8 * 3 * one.bytes

@@ -50,7 +50,7 @@ EXACT = ms.MixedNewton(tolerance=1e-13)
 
 def response(name, given, about=None):
     """Return the response of a kind of scene to its loads; or about the equilibrium near another, to less of them."""
-    keywords, values = {**kind(name).fixed, **kind(name).controls}, {}
+    keywords, values = {**kind(name).fixed, **kind(name).inputs}, {}
     for (owner, what), value in given.items():
         if owner is None:
             keywords[what] = value

@@ -104,7 +104,9 @@ def random_positions():
     scene = idle_strip()
     start = np.random.default_rng(7).uniform(-0.5, 0.5, size=scene.mesh.rest_positions.shape) * LENGTH
     found = ms.equilibrium(scene, start=start)
-    before = scene._model.energy(scene._model.state(start, np.zeros(scene.mesh.n_edges)), found._controls)
+    before = scene._model.energy(
+        scene._model.state(start, np.zeros(scene.mesh.n_edges)), found._load_parameters
+    )
     return both(below("energy over that of the start", found.energy / before, 1e-2), at_rest(found))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from answers import below, both, holds, near
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 from registry import case
 from scipy.linalg import eigh
 from sheets import LENGTH, MAGNETIZATION, cantilever, shell, strip
@@ -49,7 +49,7 @@ def same_motion_in_any_steps(time_step):
 
 def exact_fall(scene: ms.Scene, time: float) -> np.ndarray:
     """Compute the displacements of a strip suddenly under gravity, by all modes of the linear problem."""
-    problem = Problem(scene, Controls(gravity_factor=1.0))
+    problem = Problem(scene, LoadParameters(gravity_factor=1.0))
     model = problem.model
     q = model.rest_state()
     stiffness, force = problem.hessian(q, reduced=True), -model.reduce(problem.gradient(q))
@@ -102,15 +102,15 @@ def weak_jumps():
         solver=ms.MixedNewton(tolerance=1e-13),
         progress=False,
     )
-    problem = Problem(scene, Controls(), np.array([MAGNETIZATION, 0.0, 0.0]))
+    problem = Problem(scene, LoadParameters(), np.array([MAGNETIZATION, 0.0, 0.0]))
     model = problem.model
     q = model.rest_state()
     stiffness = problem.hessian(q, reduced=True)
     inertia = np.diag(np.asarray(model.free_weights(scene.shell.vertex_masses))) / dt**2
     x = v = np.zeros(len(stiffness))
     for field in fields:
-        controls = Controls(applied_flux_density=field).of(scene)
-        force = -model.reduce(np.asarray(model.gradient(q, controls)))
+        load_parameters = LoadParameters(applied_flux_density=field).of(scene)
+        force = -model.reduce(np.asarray(model.gradient(q, load_parameters)))
         now = np.linalg.solve(inertia + stiffness, inertia @ (x + dt * v) + force)
         x, v = now, (now - x) / dt
     expected = np.asarray(model.positions(model.expand(x)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from answers import Answer, at_rest, both, near, refused
 from cases_slivers import cut_inside
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 from registry import case
 from sheets import LENGTH, cantilever, end_position, force_for, shell, strip
 from theory import stretch
@@ -143,7 +143,9 @@ def tetrahedron():
 
 def hessian_is_right(mesh: ms.TriangleMesh) -> Answer:
     """Compare H p with central differences of the gradient, in a generic state."""
-    problem = Problem(ms.Scene(shell(mesh, thickness=0.01 * mesh.size), allow_rigid_motions=True), Controls())
+    problem = Problem(
+        ms.Scene(shell(mesh, thickness=0.01 * mesh.size), allow_rigid_motions=True), LoadParameters()
+    )
     rng = np.random.default_rng(2)
     length = mesh.edge_lengths.min()
     positions = mesh.rest_positions + 0.1 * length * rng.normal(size=mesh.rest_positions.shape)

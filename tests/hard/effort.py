@@ -121,9 +121,9 @@ def all_named() -> Iterator[tuple[str, Callable]]:
                     f"rolled/{degrees}/{cells[0]}x{cells[1]}/{ratio:g}",
                     lambda r=ratio, c=cells, a=degrees: _solved(rolled(r, c, a)),
                 )
-    for name, (build, controls, _) in CASES.items():
+    for name, (build, load_parameters, _) in CASES.items():
         for bending in ("midedge", "hinge"):
-            yield f"easy/{name}/{bending}", lambda b=build, c=controls, d=bending: _solved(b(d), c)
+            yield f"easy/{name}/{bending}", lambda b=build, c=load_parameters, d=bending: _solved(b(d), c)
     for load in (0.1, 0.5, 0.9):
         mesh = ms.meshes.rectangle(rolled_strip.LENGTH, rolled_strip.WIDTH, (48, 4))
         yield (
@@ -144,8 +144,8 @@ def all_named() -> Iterator[tuple[str, Callable]]:
         yield f"hard {each.family}/{each.name}", lambda c=each: bool(c.run().right)
 
 
-def _solved(scene: ms.Scene, controls: dict | None = None) -> bool:
-    return bool(ms.equilibrium(scene, **(controls or {})).stable)
+def _solved(scene: ms.Scene, load_parameters: dict | None = None) -> bool:
+    return bool(ms.equilibrium(scene, **(load_parameters or {})).stable)
 
 
 def pinched(

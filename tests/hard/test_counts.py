@@ -73,13 +73,15 @@ def test_the_file_is_written_with_a_case_a_line(tmp_path):
 
 
 def test_solves_are_counted_failed_ones_too():
-    scene, controls = strongly_bent(32)
-    found = ms.equilibrium(scene, **controls)
+    scene, load_parameters = strongly_bent(32)
+    found = ms.equilibrium(scene, **load_parameters)
 
     def twice_and_then_too_far():
         for _ in range(2):
-            ms.equilibrium(scene, **controls)
+            ms.equilibrium(scene, **load_parameters)
         with pytest.raises(ms.NotConverged):
-            ms.equilibrium(scene, solver=ms.MixedNewton(max_iterations=1, max_relaxation_steps=1), **controls)
+            ms.equilibrium(
+                scene, solver=ms.MixedNewton(max_iterations=1, max_relaxation_steps=1), **load_parameters
+            )
 
     assert count(twice_and_then_too_far)[0] >= 2 * found.factorizations

@@ -44,7 +44,7 @@ def test_fastest_scene_of_a_family_is_right(family):
 
 def test_a_wrong_end_is_told(monkeypatch):
     solve = ms.equilibrium
-    monkeypatch.setattr(ms, "equilibrium", lambda *args, **controls: solve(*args, load_factor=0.5))
+    monkeypatch.setattr(ms, "equilibrium", lambda *args, **load_parameters: solve(*args, load_factor=0.5))
     numbers = COUNTED["rolled"]
     assert "end x, z" in dict(all_named())[f"rolled/{numbers[0]:02d}"]()
 

@@ -41,7 +41,7 @@ def growing(t):
     )
 
 
-CONTROLS_OUTSIDE_TORCH = {
+LOAD_PARAMETERS_OUTSIDE_TORCH = {
     "applied_flux_density": lambda t: (0, 0, 3e-3 * math.sin(300 * float(t))),
     "field_factor": lambda t: math.sin(300 * float(t)),
     "load_factor": lambda t: number(0.1) * float(t),  # has a graph, without the time in it
@@ -49,21 +49,21 @@ CONTROLS_OUTSIDE_TORCH = {
 
 
 @pytest.mark.filterwarnings("ignore:Converting a tensor with requires_grad")
-@pytest.mark.parametrize("name", CONTROLS_OUTSIDE_TORCH)
-def test_a_control_that_leaves_torch_leaves_the_time_step_without_a_gradient(name):
-    found = moved(time_step=number(TIME_STEP), **{name: CONTROLS_OUTSIDE_TORCH[name]})
+@pytest.mark.parametrize("name", LOAD_PARAMETERS_OUTSIDE_TORCH)
+def test_a_load_parameter_that_leaves_torch_leaves_the_time_step_without_a_gradient(name):
+    found = moved(time_step=number(TIME_STEP), **{name: LOAD_PARAMETERS_OUTSIDE_TORCH[name]})
     with pytest.raises(ms.NoGradient, match=f"by time_step: {name} is a function of the time"):
         height(found).backward()
 
 
-def test_a_control_made_by_torch_has_its_share_in_the_gradient_by_the_time_step():
+def test_a_load_parameter_made_by_torch_has_its_share_in_the_gradient_by_the_time_step():
     step = number(TIME_STEP)
     height(moved(time_step=step, applied_flux_density=growing)).backward()
     expected = slope(lambda dt: height(moved(time_step=dt, applied_flux_density=growing)), TIME_STEP, 1e-7)
     assert float(step.grad) == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_control_that_is_the_same_at_all_times_needs_no_torch():
+def test_a_load_parameter_that_is_the_same_at_all_times_needs_no_torch():
     step = number(TIME_STEP)
     height(moved(time_step=step, applied_flux_density=lambda t: (0, 0, 3e-3))).backward()
     expected = slope(lambda dt: height(moved(time_step=dt)), TIME_STEP, 1e-7)

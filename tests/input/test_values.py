@@ -53,7 +53,7 @@ def test_material_has_short_forms_too(name):
     assert np.array_equal(SOLVES[name](values=own, **rest), short)
 
 
-def test_controls_in_time_and_damping_are_values_of_the_scene():
+def test_load_parameters_in_time_and_damping_are_values_of_the_scene():
     rest = {"remanent_magnetization": MAGNETIZATION}
     given = {
         "applied_flux_density": lambda t: (0, 0, t),

@@ -28,7 +28,7 @@ def as_function(value: np.ndarray, duration: float):
 
 
 def lengths_of_steps(name: str) -> np.ndarray:
-    time_step = {**kind(name).fixed, **kind(name).controls}["time_step"]
+    time_step = {**kind(name).fixed, **kind(name).inputs}["time_step"]
     return np.broadcast_to(time_step, kind(name).in_time)
 
 

@@ -11,10 +11,10 @@ FLUX = (0.3, 0.5, 0.8)
 
 
 def magnetic_energy(scene, positions):
-    model, layout = scene._model, scene._control_layout
-    controls = layout.packed({("scene", "applied_flux_density"): np.array(FLUX)}, layout.zeros())
+    model, layout = scene._model, scene._load_parameter_layout
+    load_parameters = layout.packed({("scene", "applied_flux_density"): np.array(FLUX)}, layout.zeros())
     rotations = np.zeros_like(model.edge_rotations(model.rest_state()))
-    return model.energies(model.state(positions, rotations), controls)["magnetic"]
+    return model.energies(model.state(positions, rotations), load_parameters)["magnetic"]
 
 
 def bent(points, curvature):

@@ -157,7 +157,7 @@ def test_t9a_incompressible_tube_and_its_axial_force(case):
     assert rest.load_steps == 1 and rest.iterations <= 10
     assert np.allclose(radii, (inner, outer), rtol=1e-3)
     solid, model = rest.scene.bodies[0], rest.scene._model
-    pulls = model.positions(model.gradient(rest._state, rest._controls))
+    pulls = model.positions(model.gradient(rest._state, rest._load_parameters))
     assert np.isclose(-4 * pulls[at(solid, z=0.0), 2].sum(), force, rtol=1e-3)
 
 
@@ -179,7 +179,7 @@ def test_t9a_incompressible_tube_at_three_times_its_radius():
     )
     assert np.allclose(radii, (inner, outer), rtol=2e-3)
     solid, model = rest.scene.bodies[0], rest.scene._model
-    pulls = model.positions(model.gradient(rest._state, rest._controls))
+    pulls = model.positions(model.gradient(rest._state, rest._load_parameters))
     assert np.isclose(-4 * pulls[at(solid, z=0.0), 2].sum(), force, rtol=1e-3)
 
 

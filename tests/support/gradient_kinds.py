@@ -107,8 +107,8 @@ def among_magnets() -> Kind:
         fields.append(ms.CylinderMagnet(0.4 * size, 0.7 * size, center=above, **place))
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4)
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=fields)
-    controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.2}
-    return Kind(scene, controls, fixed=EXACT, reach=REACH)
+    inputs = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.2}
+    return Kind(scene, inputs, fixed=EXACT, reach=REACH)
 
 
 def swirl(x):
@@ -123,8 +123,8 @@ def positioned_grid():
 def in_a_positioned_grid() -> Kind:
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4)
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=positioned_grid())
-    controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.1}
-    return Kind(scene, controls, fixed=EXACT, reach=REACH)
+    inputs = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.1}
+    return Kind(scene, inputs, fixed=EXACT, reach=REACH)
 
 
 def among_fields_that_move() -> Kind:
@@ -143,15 +143,15 @@ def among_fields_that_move() -> Kind:
     turned = ms.Clamp(MESH.edges_at(x=0.0), displacement=(1e-4, 0, 2e-4), rotation=(0.0, 0.1, 0.0))
     lifted = ms.Pin(MESH.vertices_at(x=0.1), "z", displacement=(0, 0, 1e-4), rotation=(0.0, 0.0, 0.1))
     scene = ms.Scene(sheet, supports=[turned, lifted], field=fields)
-    controls = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.5, "time_step": 3e-3}
+    inputs = {"remanent_magnetization": MAGNETIZATION, "field_factor": 0.5, "time_step": 3e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": ms.SDIRK2(), "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=STEPS)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=STEPS)
 
 
 def load_cases() -> Kind:
     fields = np.array([DEFAULTS["applied_flux_density"], (0, 0, -2e-3)])
-    controls = {**DEFAULTS, **FACTORS, "applied_flux_density": fields, "load_factor": np.array([0.9, 0.2])}
-    return Kind(everything(), controls, fixed=EXACT, reach=REACH)
+    inputs = {**DEFAULTS, **FACTORS, "applied_flux_density": fields, "load_factor": np.array([0.9, 0.2])}
+    return Kind(everything(), inputs, fixed=EXACT, reach=REACH)
 
 
 def warm(scene, values, start=None, solver=None, **design):
@@ -165,13 +165,13 @@ def warm(scene, values, start=None, solver=None, **design):
 
 def moving(integrator, bending="midedge", in_time=0, **options) -> Kind:
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
-    controls = {**IN_TIME, **BEGIN, **VISCOUS}
+    inputs = {**IN_TIME, **BEGIN, **VISCOUS}
     reach = {
         **REACH,
         **{name: 1e2 * np.max(value) for name, value in VISCOUS.items()},
     }  # which do little here
     return Kind(
-        everything(bending), controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach, in_time=in_time
+        everything(bending), inputs, ms.simulate, fixed=fixed, step=1e-5, reach=reach, in_time=in_time
     )
 
 
@@ -205,7 +205,7 @@ def thrown(
         field=ms.UniformField(),
         allow_rigid_motions=True,
     )
-    controls = {
+    inputs = {
         "remanent_magnetization": (2e4, 0, 3e3),
         "applied_flux_density": (1e-3, 0.0, 4e-3),
         "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * RNG.standard_normal((N_V, 3)),
@@ -215,10 +215,10 @@ def thrown(
     }
     fixed = {**EXACT, "steps": 6, "integrator": integrator or ms.ImplicitEuler(), "progress": False}
     if motion is not None:  # a function of the time: there is no gradient by time_step
-        fixed["time_step"] = controls.pop("time_step")
+        fixed["time_step"] = inputs.pop("time_step")
     fixed |= options or {}
     reach = {**REACH, "rest_positions": 0.025}  # a quarter of the sheet: contacts begin within larger steps
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=reach, in_time=in_time)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=step, reach=reach, in_time=in_time)
 
 
 def in_a_corner() -> Kind:
@@ -235,27 +235,27 @@ def in_a_corner() -> Kind:
         gravity=turn @ [2, 0, -9.81],
         allow_rigid_motions=True,
     )
-    controls = {"velocities": turn @ [0.0, 0.0, -0.3], "time_step": 2e-3}
+    inputs = {"velocities": turn @ [0.0, 0.0, -0.3], "time_step": 2e-3}
     fixed = {**EXACT, "steps": 6, "integrator": ms.SDIRK3(), "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
 
 
 def swaying(t):
     return np.array([0.02 * t, 0.04 * t, 2e-4 * np.sin(40 * t)]), np.array([0.3 * t, 0.2 * t, 0.5 * t])
 
 
-def from_an_equilibrium(scene, values, **controls):
+def from_an_equilibrium(scene, values, **inputs):
     """Return a motion that starts from an equilibrium under other load parameters."""
-    of_sheet = {name: controls[name] for name in ("remanent_magnetization",)}
+    of_sheet = {name: inputs[name] for name in ("remanent_magnetization",)}
     shared = {owner: named for owner, named in values.items()}
     rest = ms.equilibrium(scene, **of_sheet, applied_flux_density=(0, 0, 2e-3), values=shared, **EXACT)
-    return ms.simulate(scene, start=rest, values=values, **controls)
+    return ms.simulate(scene, start=rest, values=values, **inputs)
 
 
 def let_go() -> Kind:
-    controls = {name: IN_TIME[name] for name in ("remanent_magnetization", "applied_flux_density")}
+    inputs = {name: IN_TIME[name] for name in ("remanent_magnetization", "applied_flux_density")}
     fixed = {**EXACT, "steps": STEPS, "time_step": 2e-3, "progress": False}
-    return Kind(everything(), controls, ms.simulate, from_an_equilibrium, fixed, 1e-5, REACH)
+    return Kind(everything(), inputs, ms.simulate, from_an_equilibrium, fixed, 1e-5, REACH)
 
 
 RUBS = {"friction_coefficient": 0.4}

@@ -44,5 +44,5 @@ def actuated_in_motion(integrator, **options) -> Kind:
     bodies, pins, actuators = _actuated()
     scene = ms.Scene(bodies, supports=pins, actuators=actuators)
     fixed = {"steps": 3, "integrator": integrator, "progress": False, **EXACT, **options}
-    controls = {"time_step": 1e-3, "load_factor": np.linspace(0.5, 1.0, 4)}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach=REACH, in_time=3)
+    inputs = {"time_step": 1e-3, "load_factor": np.linspace(0.5, 1.0, 4)}
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-4, reach=REACH, in_time=3)

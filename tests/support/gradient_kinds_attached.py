@@ -52,13 +52,13 @@ def thrown_onto_attached(integrator, **contact) -> Kind:
         allow_rigid_motions=True,
     )
     rng = np.random.default_rng(41)
-    controls = {
+    inputs = {
         "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * rng.standard_normal((N_V, 3)),
         "time_step": 2e-3,
         "gravity_factor": 0.9,
     }
     fixed = {**EXACT, "steps": 6, "integrator": integrator, "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach={**REACH, **PLACE})
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-4, reach={**REACH, **PLACE})
 
 
 def resting_on_attached() -> Kind:
@@ -79,12 +79,12 @@ def thrown_onto_a_moving_ellipsoid() -> Kind:
         _sheet(), contacts=[ms.Contact(egg, **RUBS)], gravity=(0, 0.3, -9.81), allow_rigid_motions=True
     )
     rng = np.random.default_rng(43)
-    controls = {
+    inputs = {
         "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * rng.standard_normal((N_V, 3)),
         "time_step": 2e-3,
     }
     fixed = {**EXACT, "steps": 6, "integrator": ms.ImplicitEuler(), "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=6)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=6)
 
 
 ATTACHED_MAKERS = {

@@ -52,10 +52,10 @@ def rigid_in_motion(integrator, own=None, **options) -> Kind:
     moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
     begin = MESH.rest_positions + 1e-4 * RNG.standard_normal((N_V, 3))
     begin[CORNER] = MESH.rest_positions[CORNER] + (1e-4, 2e-4, 1e-4)
-    controls = {**IN_TIME, "start": begin, "velocities": moves, "time_step": 3e-3}
+    inputs = {**IN_TIME, "start": begin, "velocities": moves, "time_step": 3e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach, in_time=STEPS)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=reach, in_time=STEPS)
 
 
 def two_sheets():
@@ -106,8 +106,8 @@ def two_sheets_at_rest() -> Kind:
         field=[ms.UniformField(), DIPOLES],
         gravity=(0.2, 0.1, -9.81),
     )
-    controls = {**FACTORS, "applied_flux_density": (1e-3, -5e-4, 2e-3)}
-    return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
+    inputs = {**FACTORS, "applied_flux_density": (1e-3, -5e-4, 2e-3)}
+    return Kind(scene, inputs, fixed=EXACT, step=1e-5, reach=REACH)
 
 
 def two_sheets_in_motion() -> Kind:
@@ -126,7 +126,7 @@ def two_sheets_in_motion() -> Kind:
         allow_rigid_motions=True,
     )
     n_v = scene.mesh.n_vertices
-    controls = {
+    inputs = {
         "applied_flux_density": (1e-3, 0.0, 4e-3),
         "support_factor": np.linspace(0, 0.7, 7),
         "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * RNG.standard_normal((n_v, 3)),
@@ -136,7 +136,7 @@ def two_sheets_in_motion() -> Kind:
     }
     reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
     fixed = {**EXACT, "steps": 6, "integrator": ms.SDIRK2(), "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
 
 
 def tied(moves: bool) -> Kind:
@@ -176,10 +176,10 @@ def tied(moves: bool) -> Kind:
         field=[ms.UniformField(), DIPOLES],
         gravity=(0.2, 0.1, -9.81),
     )
-    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "support_factor": 0.7, "gravity_factor": 0.8}
+    inputs = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "support_factor": 0.7, "gravity_factor": 0.8}
     if not moves:
-        return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
-    controls |= {
+        return Kind(scene, inputs, fixed=EXACT, step=1e-5, reach=REACH)
+    inputs |= {
         "velocities": (0.01, 0.02, -0.05),
         "damping": RNG.uniform(1e-3, 2e-3, scene.mesh.n_vertices),
         "stiffness_damping": 1e-3,
@@ -187,7 +187,7 @@ def tied(moves: bool) -> Kind:
     }
     reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
     fixed = {**EXACT, "steps": 4, "integrator": ms.TRBDF2(), "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-3, reach=reach)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-3, reach=reach)
 
 
 def solid_at_rest(material=None, element="quadratic", **more) -> Kind:
@@ -250,8 +250,8 @@ def magnetized_solid_at_rest() -> Kind:
         gravity=(0.2, 0.1, -9.81),
         contacts=[floor],
     )
-    controls = {"applied_flux_density": (2e-3, -3e-3, 1e-2), "field_factor": 0.9, "load_factor": 0.8}
-    return Kind(scene, controls, fixed=EXACT, reach=REACH)
+    inputs = {"applied_flux_density": (2e-3, -3e-3, 1e-2), "field_factor": 0.9, "load_factor": 0.8}
+    return Kind(scene, inputs, fixed=EXACT, reach=REACH)
 
 
 def magnetized_solid_in_motion() -> Kind:
@@ -274,16 +274,16 @@ def magnetized_solid_in_motion() -> Kind:
 def solid_in_motion() -> Kind:
     still = solid_at_rest(ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.45), "linear")
     fixed = {"steps": 3, "integrator": ms.TRBDF2(), **EXACT}
-    controls = {"time_step": 2e-3, "gravity_factor": 1.1, **VISCOUS}
-    return Kind(still.scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
+    inputs = {"time_step": 2e-3, "gravity_factor": 1.1, **VISCOUS}
+    return Kind(still.scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=REACH)
 
 
 def solid_by_projective_dynamics() -> Kind:
     still = solid_at_rest(ms.ProjectiveMaterial(young_modulus=1e5, poisson_ratio=0.3), "linear")
     tight = ms.ProjectiveDynamics(tolerance=1e-12, iterations=5000)
-    controls = {"time_step": 2e-3, "gravity_factor": 1.1, **VISCOUS}
+    inputs = {"time_step": 2e-3, "gravity_factor": 1.1, **VISCOUS}
     return Kind(
-        still.scene, controls, ms.simulate, fixed={"steps": 3, "integrator": tight}, step=1e-5, reach=REACH
+        still.scene, inputs, ms.simulate, fixed={"steps": 3, "integrator": tight}, step=1e-5, reach=REACH
     )
 
 
@@ -313,11 +313,11 @@ def solid_with_company(moves: bool) -> Kind:
         field=[ms.UniformField(), DIPOLES],
         gravity=(0.2, 0.1, -9.81),
     )
-    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "gravity_factor": 0.8}
+    inputs = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "gravity_factor": 0.8}
     if not moves:
-        return Kind(scene, controls, fixed=EXACT, step=1e-4, reach=REACH)
-    controls |= {"stiffness_damping": 1e-3, "time_step": 2e-3}
+        return Kind(scene, inputs, fixed=EXACT, step=1e-4, reach=REACH)
+    inputs |= {"stiffness_damping": 1e-3, "time_step": 2e-3}
     fixed = {**EXACT, "steps": 3, "integrator": ms.ImplicitEuler(), "progress": False}
     return Kind(
-        scene, controls, ms.simulate, fixed=fixed, step=1e-3, reach={**REACH, "stiffness_damping": 1e-1}
+        scene, inputs, ms.simulate, fixed=fixed, step=1e-3, reach={**REACH, "stiffness_damping": 1e-1}
     )

@@ -47,9 +47,9 @@ def sheets_rubbing(integrator, step=1e-6, **contact) -> Kind:
     )
     velocities = np.zeros((scene.mesh.n_vertices, 3))
     velocities[MESH.n_vertices :] = (0.1, 0.05, -0.15)
-    controls = {"velocities": velocities, "time_step": 1e-3, "support_factor": np.linspace(0, 0.7, 6)}
+    inputs = {"velocities": velocities, "time_step": 1e-3, "support_factor": np.linspace(0, 0.7, 6)}
     fixed = {**EXACT, "steps": 6, "integrator": integrator, "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=step, reach=REACH)
 
 
 FLAT = ms.meshes.rectangle(0.12, 0.03, cells=(8, 1))
@@ -77,15 +77,15 @@ def onto_itself(**contact) -> tuple[ms.Scene, dict]:
 
 
 def folded_at_rest() -> Kind:
-    scene, controls = onto_itself()
-    return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
+    scene, inputs = onto_itself()
+    return Kind(scene, inputs, fixed=EXACT, step=1e-5, reach=REACH)
 
 
 def folded_and_rubbing() -> Kind:
-    scene, controls = onto_itself(law="penalty", contact_stiffness=1e4, **{**RUBS, "sticking_speed": 0.1})
+    scene, inputs = onto_itself(law="penalty", contact_stiffness=1e4, **{**RUBS, "sticking_speed": 0.1})
     fixed = {**EXACT, "steps": 8, "integrator": ms.ImplicitEuler(), "progress": False}
-    controls |= {"time_step": 4e-3, "velocities": (0.0, 0.1, 0.0)}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-6, reach=REACH)
+    inputs |= {"time_step": 4e-3, "velocities": (0.0, 0.1, 0.0)}
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-6, reach=REACH)
 
 
 CONTACT_MAKERS = {

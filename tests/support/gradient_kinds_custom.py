@@ -62,5 +62,5 @@ def custom_energies_in_motion() -> Kind:
     supports = [ms.Clamp(MESH.edges_at(x=0.0), body=sheet)]
     scene = ms.Scene([sheet, other], supports=supports, loads=loads, allow_rigid_motions=True)
     fixed = {**EXACT, "steps": 3, "integrator": ms.TRBDF2(), "progress": False}
-    controls = {"time_step": 2e-3, "load_factor": np.linspace(0.5, 1.0, 4)}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach=REACH, in_time=3)
+    inputs = {"time_step": 2e-3, "load_factor": np.linspace(0.5, 1.0, 4)}
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-4, reach=REACH, in_time=3)

@@ -84,11 +84,11 @@ def growing(integrator, in_time: int = 0, six_nodes: bool = False, **keywords) -
         )
     else:
         sheet = _sheet(_DOME, "midedge", RNG.uniform(1.01, 1.02, N_F), _tensors(N_F, 3.0, 2.0))
-    controls = {name: VISCOUS[name] for name in ("stiffness_damping", "maxwell_modulus", "maxwell_time")}
-    controls |= {"time_step": 2e-3}
+    inputs = {name: VISCOUS[name] for name in ("stiffness_damping", "maxwell_modulus", "maxwell_time")}
+    inputs |= {"time_step": 2e-3}
     fixed = {**EXACT, "steps": 3, "integrator": integrator, "progress": False, **keywords}
     reach = {**_REACH, "stiffness_damping": 1e-2}
-    return Kind(_clamped(sheet), controls, ms.simulate, fixed=fixed, reach=reach, step=1e-5, in_time=in_time)
+    return Kind(_clamped(sheet), inputs, ms.simulate, fixed=fixed, reach=reach, step=1e-5, in_time=in_time)
 
 
 _REACH = {**REACH, "growth": 0.1, "rest_curvature": 10.0}

@@ -50,8 +50,8 @@ def vibrating_solid() -> Kind:
     )
     pin = ms.Pin(block.mesh.vertices_at(x=0.0))
     scene = ms.Scene(block, supports=[pin], field=ms.UniformField(), gravity=(0.2, 0.1, -9.81))
-    controls = {"applied_flux_density": (2e-3, 1e-3, 2e-2), "gravity_factor": 0.9}
-    return Kind(scene, controls, solve=frequencies, fixed=EXACT, reach=REACH)
+    inputs = {"applied_flux_density": (2e-3, 1e-3, 2e-2), "gravity_factor": 0.9}
+    return Kind(scene, inputs, solve=frequencies, fixed=EXACT, reach=REACH)
 
 
 def vibrating_at_rest() -> Kind:
@@ -115,9 +115,9 @@ def deflection(found) -> SimpleNamespace:
 
 def responding_sheet(about: bool) -> Kind:
     """Build the sheet on which everything acts; its rest shape or an equilibrium changes by linear theory."""
-    controls = {**DEFAULTS, **FACTORS}
+    inputs = {**DEFAULTS, **FACTORS}
     solve = response_about if about else response
-    return Kind(everything(), controls, solve=solve, fixed=EXACT, reach=REACH, of_linear=True)
+    return Kind(everything(), inputs, solve=solve, fixed=EXACT, reach=REACH, of_linear=True)
 
 
 def column(gravity=(-9.81, 1.0, 0)) -> ms.Scene:
@@ -134,17 +134,17 @@ def column(gravity=(-9.81, 1.0, 0)) -> ms.Scene:
 
 
 def buckling_column() -> Kind:
-    controls = {
+    inputs = {
         "load_factor": 0.9,
         "gravity_factor": 0.8,
         "remanent_magnetization": (3e3, 1e3, 0),
         "applied_flux_density": (-1e-3, 3e-4, 0),
     }
-    return Kind(column(), controls, solve=buckling, reach=REACH, of_linear=True)
+    return Kind(column(), inputs, solve=buckling, reach=REACH, of_linear=True)
 
 
 def buckling_bent_column() -> Kind:
-    controls = {
+    inputs = {
         "load_factor": 0.9,
         "gravity_factor": 0.3,
         "remanent_magnetization": (3e3, 1e3, 2e2),
@@ -153,7 +153,7 @@ def buckling_bent_column() -> Kind:
     scene = column((-9.81, 1.0, 1.0))  # to one side, so that differences stay on one branch
     # Long steps: the change of the stiffness along the way is a difference, with round-off of its own.
     reach = {**REACH, "rest_positions": 5e-3}
-    return Kind(scene, controls, solve=buckling_about, fixed=EXACT, step=2e-3, reach=reach)
+    return Kind(scene, inputs, solve=buckling_about, fixed=EXACT, step=2e-3, reach=reach)
 
 
 def snap(scene, values, start=None, solver=None, **given):
@@ -201,13 +201,13 @@ def snapping_beam() -> Kind:
     )
     magnetization = np.zeros((mesh.n_faces, 3))
     magnetization[:, 0] = 5.4e4 * np.sign(mesh.face_barycenters[:, 0] - 0.06)
-    controls = {
+    inputs = {
         "remanent_magnetization": magnetization,
         "applied_flux_density": (1e-3, 2e-4, 2e-2),
         **FACTORS,
     }
     reach = {**REACH, "displacement": 3e-4, "rotation": 0.01, "center": 1e-3}
-    return Kind(scene, controls, solve=snap, fixed=EXACT, reach=reach, of_linear=True)
+    return Kind(scene, inputs, solve=snap, fixed=EXACT, reach=reach, of_linear=True)
 
 
 LINEAR_MAKERS = {

@@ -60,8 +60,8 @@ def rotating_magnetization(moves: bool) -> Kind:
         ms.Pin(solid.mesh.vertices_at(x=0.0), body=solid),
     ]
     scene = ms.Scene(bodies, supports=supports, field=[ms.UniformField(), DIPOLES], gravity=(0.2, 0.1, -9.81))
-    controls = {"applied_flux_density": np.array([2e-3, -1e-3, 3e-3]), "field_factor": 0.7}
+    inputs = {"applied_flux_density": np.array([2e-3, -1e-3, 3e-3]), "field_factor": 0.7}
     if not moves:
-        return Kind(scene, controls, fixed=EXACT, reach=REACH)
+        return Kind(scene, inputs, fixed=EXACT, reach=REACH)
     fixed = {**EXACT, "steps": 3, "integrator": ms.TRBDF2(), "progress": False}
-    return Kind(scene, {**controls, "time_step": 2e-3}, ms.simulate, fixed=fixed, step=1e-4, reach=REACH)
+    return Kind(scene, {**inputs, "time_step": 2e-3}, ms.simulate, fixed=fixed, step=1e-4, reach=REACH)

@@ -62,8 +62,8 @@ def muscles_in_motion(integrator, in_time: int = 0) -> Kind:
     )
     fixed = {**EXACT, "steps": 3, "integrator": integrator, "progress": False}
     x = body.mesh.rest_positions
-    controls = {
+    inputs = {
         "time_step": 2e-3,
         "velocities": (x[:, :1] / 0.1) * (0.3, 0.2, -0.4) * RNG.uniform(0.8, 1.2, (len(x), 1)),
     }
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach=REACH, in_time=in_time)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-4, reach=REACH, in_time=in_time)

@@ -30,12 +30,12 @@ def own_field(moves: bool) -> Kind:
         for mesh, sheet in zip(meshes, sheets, strict=True)
     ]
     magnetization = rng.uniform(-1.0, 1.0, (2 * MESH.n_faces, 3)) * 4e4 + np.array([3e4, 0.0, 2e4])
-    controls = {"remanent_magnetization": magnetization}
+    inputs = {"remanent_magnetization": magnetization}
     if moves:
-        controls["remanent_magnetization"] = magnetization * np.array([1.0, 1.0, 0.0])
+        inputs["remanent_magnetization"] = magnetization * np.array([1.0, 1.0, 0.0])
         scene = ms.Scene(sheets, supports=supports, own_field=ms.OwnField())
         fixed = {"steps": 3, "integrator": ms.TRBDF2(), "progress": False, **EXACT}
-        return Kind(scene, {"time_step": 2e-3, **controls}, ms.simulate, fixed=fixed, step=1e-4, reach=REACH)
+        return Kind(scene, {"time_step": 2e-3, **inputs}, ms.simulate, fixed=fixed, step=1e-4, reach=REACH)
     scene = ms.Scene(sheets, supports=supports, own_field=ms.OwnField(), field=ms.UniformField())
-    controls["applied_flux_density"] = np.array([1e-4, -2e-4, 3e-4])
-    return Kind(scene, controls, fixed=EXACT, reach=REACH)
+    inputs["applied_flux_density"] = np.array([1e-4, -2e-4, 3e-4])
+    return Kind(scene, inputs, fixed=EXACT, reach=REACH)

@@ -43,8 +43,8 @@ def pressed_solid(moves: bool) -> Kind:
     )
     scene = ms.Scene(body, supports=supports, loads=loads, contacts=[floor])
     fixed = {"steps": 3, "integrator": ms.TRBDF2(), "progress": False, **EXACT}
-    controls = {"time_step": 2e-3, "load_factor": np.linspace(0.5, 1.0, 4)}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach=REACH, in_time=3)
+    inputs = {"time_step": 2e-3, "load_factor": np.linspace(0.5, 1.0, 4)}
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-4, reach=REACH, in_time=3)
 
 
 def pressed_sheet(moves: bool) -> Kind:
@@ -58,5 +58,5 @@ def pressed_sheet(moves: bool) -> Kind:
     touching = [ms.Contact(under(ob.Plane, -2e-3), contact_stiffness=50.0, offset=1e-4)]
     scene = ms.Scene(sheet, supports=supports, loads=loads, contacts=touching)
     fixed = {**EXACT, "steps": 3, "integrator": ms.SDIRK2(), "progress": False}
-    controls = {"time_step": 2e-3, "support_factor": np.linspace(0, 0.7, 4)}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach=REACH)
+    inputs = {"time_step": 2e-3, "support_factor": np.linspace(0, 0.7, 4)}
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-4, reach=REACH)

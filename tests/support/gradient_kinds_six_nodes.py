@@ -66,8 +66,8 @@ def six_nodes_at_rest() -> Kind:
         field=[ms.UniformField(), DIPOLES],
         gravity=(0.2, 0.1, -9.81),
     )
-    controls = {**FACTORS, "applied_flux_density": (1e-3, -5e-4, 2e-3)}
-    return Kind(scene, controls, fixed=EXACT, step=1e-5, reach=REACH)
+    inputs = {**FACTORS, "applied_flux_density": (1e-3, -5e-4, 2e-3)}
+    return Kind(scene, inputs, fixed=EXACT, step=1e-5, reach=REACH)
 
 
 def six_nodes_in_motion() -> Kind:
@@ -84,7 +84,7 @@ def six_nodes_in_motion() -> Kind:
         allow_rigid_motions=True,
     )
     n_v = sheet.mesh.n_vertices
-    controls = {
+    inputs = {
         "remanent_magnetization": _magnetization(sheet.mesh.n_elements),
         "applied_flux_density": (1e-3, 0.0, 4e-3),
         "velocities": np.array([0.05, 0.03, -0.3]) + 1e-2 * RNG.standard_normal((n_v, 3)),
@@ -94,4 +94,4 @@ def six_nodes_in_motion() -> Kind:
     }
     reach = {**REACH, "damping": 1e-2, "stiffness_damping": 1e-1}
     fixed = {**EXACT, "steps": 4, "integrator": ms.TRBDF2(), "progress": False}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=reach)

@@ -162,12 +162,12 @@ def motorized_skeleton_at_rest() -> Kind:
 
 
 def motorized_skeleton_in_motion(integrator, **options) -> Kind:
-    controls = {**IN_TIME, "time_step": 5e-3}
+    inputs = {**IN_TIME, "time_step": 5e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     in_time = {"in_time": STEPS} if "adjoint_storage" in options else {}
     step = 3e-4 if in_time else 1e-5
     return Kind(
-        _motorized_skeleton(True), controls, ms.simulate, fixed=fixed, step=step, reach=_REACH, **in_time
+        _motorized_skeleton(True), inputs, ms.simulate, fixed=fixed, step=step, reach=_REACH, **in_time
     )
 
 
@@ -180,10 +180,10 @@ def motorized_skeleton_on_a_plane() -> Kind:
         smoothing=1e-3,
         friction_coefficient=0.4,
     )
-    controls = {**IN_TIME, "time_step": 3e-3}
+    inputs = {**IN_TIME, "time_step": 3e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": ms.TRBDF2(implicit_contact=True), "progress": False}
     scene = _motorized_skeleton(True, contacts=[floor])
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-4, reach=_REACH)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-4, reach=_REACH)
 
 
 def skeleton_at_rest() -> Kind:
@@ -195,12 +195,12 @@ def skeleton_in_motion(integrator, **options) -> Kind:
     turning = np.cross([2.0, 5.0, -1.0], MESH.rest_positions - MIDDLE)
     moves = np.array([0.02, 0.01, -0.1]) + turning + 0.05 * RNG.standard_normal((N_V, 3))
     moves[CORNER] = (np.array([0.02, 0.01, -0.1]) + turning)[CORNER]
-    controls = {**IN_TIME, "velocities": moves, "time_step": 5e-3}
+    inputs = {**IN_TIME, "velocities": moves, "time_step": 5e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": integrator, "progress": False, **options}
     in_time = {"in_time": STEPS} if "adjoint_storage" in options else {}
     # The small first steps of TR-BDF2 leave their round-off in velocities: longer differences feel less of it.
     step = 1e-3 if in_time else 1e-5
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=step, reach=REACH, **in_time)
 
 
 def thrown_skeleton() -> Kind:
@@ -233,10 +233,10 @@ def thrown_skeleton() -> Kind:
         gravity=(0, 0, -2.0),
         allow_rigid_motions=True,
     )
-    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "time_step": 3e-3}
+    inputs = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "time_step": 3e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": ms.ImplicitEuler(), "progress": False}
     reach = {**REACH, "velocity": 0.1, "angular_velocity": 10.0, "center": 0.01, "rate": 5.0}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
 
 
 def turning_screw() -> Kind:
@@ -248,10 +248,10 @@ def turning_screw() -> Kind:
     scene = ms.Scene(
         ms.Skeleton([nut], [screw]), field=ms.UniformField(), gravity=(0, 0, -2.0), allow_rigid_motions=True
     )
-    controls = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "time_step": 3e-3}
+    inputs = {"applied_flux_density": (1e-3, -5e-4, 2e-3), "time_step": 3e-3}
     fixed = {**EXACT, "steps": STEPS, "integrator": ms.ImplicitEuler(), "progress": False}
     reach = {**REACH, "center": 0.01, "rate": 5.0}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=reach)
 
 
 def _screws(moves: bool):
@@ -300,7 +300,7 @@ def screws_at_rest() -> Kind:
 
 
 def screws_in_motion() -> Kind:
-    controls = {**IN_TIME, "time_step": 5e-3}
+    inputs = {**IN_TIME, "time_step": 5e-3}
     fixed = {
         **EXACT,
         "steps": STEPS,
@@ -308,4 +308,4 @@ def screws_in_motion() -> Kind:
         "progress": False,
         "adjoint_storage": "stages",
     }
-    return Kind(_screws(True), controls, ms.simulate, fixed=fixed, step=3e-4, reach=_REACH, in_time=STEPS)
+    return Kind(_screws(True), inputs, ms.simulate, fixed=fixed, step=3e-4, reach=_REACH, in_time=STEPS)

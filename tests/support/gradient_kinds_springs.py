@@ -63,8 +63,8 @@ def on_springs_in_motion(integrator, damped: bool, **options) -> Kind:
         bodies, supports=supports, loads=springs, gravity=(0.2, 0.1, -9.81), allow_rigid_motions=True
     )
     fixed = {"steps": 3, "integrator": integrator, "progress": False, **EXACT, **options}
-    controls = {"time_step": 4e-3, "gravity_factor": np.linspace(0.5, 1.0, 4)}
-    return Kind(scene, controls, ms.simulate, fixed=fixed, reach=REACH, in_time=3)
+    inputs = {"time_step": 4e-3, "gravity_factor": np.linspace(0.5, 1.0, 4)}
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, reach=REACH, in_time=3)
 
 
 def _creased(bending: str) -> tuple[ms.Shell, ms.Clamp]:

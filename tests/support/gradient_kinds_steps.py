@@ -13,8 +13,8 @@ _RATIOS = np.array([1.0, 0.6, 1.7, 0.8, 1.3, 0.5])  # of neighbouring steps
 
 def in_given_steps(made: Kind) -> Kind:
     """Build the kind with a length for each step."""
-    lengths = made.controls["time_step"] * np.resize(_RATIOS, made.fixed["steps"])
-    return replace(made, controls={**made.controls, "time_step": lengths})
+    lengths = made.inputs["time_step"] * np.resize(_RATIOS, made.fixed["steps"])
+    return replace(made, inputs={**made.inputs, "time_step": lengths})
 
 
 def in_divided_steps(made: Kind) -> Kind:

@@ -43,8 +43,8 @@ def susceptible_shells(moves: bool) -> Kind:
         field=[ms.UniformField(), magnet, dipole],
         gravity=(0.2, 0.1, -9.81),
     )
-    controls = {"applied_flux_density": np.array([1e-2, -2e-2, 3e-2]), "field_factor": 0.8}
+    inputs = {"applied_flux_density": np.array([1e-2, -2e-2, 3e-2]), "field_factor": 0.8}
     if not moves:
-        return Kind(scene, controls, fixed=EXACT, reach=REACH)
+        return Kind(scene, inputs, fixed=EXACT, reach=REACH)
     fixed = {**EXACT, "steps": 3, "integrator": ms.TRBDF2(), "progress": False}
-    return Kind(scene, {**controls, "time_step": 1e-3}, ms.simulate, fixed=fixed, step=1e-3, reach=REACH)
+    return Kind(scene, {**inputs, "time_step": 1e-3}, ms.simulate, fixed=fixed, step=1e-3, reach=REACH)

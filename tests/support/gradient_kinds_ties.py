@@ -53,9 +53,9 @@ def _solid() -> tuple[ms.Solid, list]:
 def tied_sheet_at_rest(six: bool) -> Kind:
     sheet, supports = _sheet(six)
     scene = ms.Scene(sheet, supports=supports, field=[ms.UniformField(), DIPOLES], gravity=(0.3, 0.2, -1.0))
-    controls = {"applied_flux_density": (1e-3, 0.0, 2e-3), "gravity_factor": 0.9, "support_factor": 0.8}
-    controls["remanent_magnetization"] = (2e4, 0.0, 1e4)
-    return Kind(scene, controls, fixed=EXACT, reach=REACH)
+    inputs = {"applied_flux_density": (1e-3, 0.0, 2e-3), "gravity_factor": 0.9, "support_factor": 0.8}
+    inputs["remanent_magnetization"] = (2e4, 0.0, 1e4)
+    return Kind(scene, inputs, fixed=EXACT, reach=REACH)
 
 
 def tied_solid_at_rest() -> Kind:
@@ -68,12 +68,12 @@ def tied_in_motion(integrator, solid: bool, **options) -> Kind:
     body, supports = _solid() if solid else _sheet(six=False)
     scene = ms.Scene(body, supports=supports, gravity=(0.3, 0.2, -9.81))
     fixed = {"steps": 3, "integrator": integrator, "progress": False, **EXACT, **options}
-    controls = {
+    inputs = {
         "time_step": 4e-3,
         "gravity_factor": np.linspace(0.5, 1.0, 4),
         "velocities": 1e-2 * RNG.standard_normal((body.mesh.n_vertices, 3)),
     }
-    return Kind(scene, controls, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=3)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=3)
 
 
 TIE_MAKERS = {

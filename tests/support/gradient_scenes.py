@@ -38,7 +38,7 @@ def continuous(solve) -> set[str]:
 class Kind:
     """A kind of scene, and how it is solved.
 
-    solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it. controls: by
+    solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it. inputs: by
     keyword, the inputs that belong to no object. fixed: other keywords. step: of differences, over the size of a
     value; reach: that size, where it is not the value's own. in_time: steps of the motion over which everything
     varies_in_time somewhere that can, or 0. of_linear: whether it is a solve of linear theory or a path that takes no rest
@@ -46,7 +46,7 @@ class Kind:
     """
 
     scene: ms.Scene
-    controls: dict[str, object]
+    inputs: dict[str, object]
     function: Callable = ms.equilibrium
     solve: Callable | None = None
     fixed: dict[str, object] = field(default_factory=dict)
@@ -57,7 +57,7 @@ class Kind:
 
     def found(self, given: dict[tuple, object], start=None):
         """Find the solution with these inputs, {(object or None, name): value}, in place of its own."""
-        keywords, values = {**self.fixed, **self.controls}, {}
+        keywords, values = {**self.fixed, **self.inputs}, {}
         for (owner, name), value in given.items():
             if owner is None:
                 keywords[name] = value
@@ -106,7 +106,7 @@ class Kind:
     @cached_property
     def of_solve(self) -> dict[tuple, np.ndarray]:
         """The keywords as {(None, keyword): value}: load parameters, and uniform values of the objects."""
-        own = {(None, name): np.array(value, dtype=np.float64) for name, value in self.controls.items()}
+        own = {(None, name): np.array(value, dtype=np.float64) for name, value in self.inputs.items()}
         for (owner, name), value in self.of_objects.items():
             if owner is self.scene and name in continuous(self.function):
                 own[None, name] = value
@@ -138,7 +138,7 @@ class Kind:
 
     def _once(self, key: tuple) -> bool:
         owner, name = key
-        return name in self.controls if owner is None else name != "vertex_loads"
+        return name in self.inputs if owner is None else name != "vertex_loads"
 
     @cached_property
     def entries(self) -> dict[tuple, np.ndarray]:

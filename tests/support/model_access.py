@@ -11,7 +11,7 @@ from magshell.model.scene.values import Values
 
 
 @dataclass(frozen=True)
-class Controls:
+class LoadParameters:
     """The load parameters of a scene: T, and factors."""
 
     applied_flux_density: tuple[float, ...] = (0.0, 0.0, 0.0)
@@ -23,15 +23,17 @@ class Controls:
     def of(self, scene: ms.Scene) -> np.ndarray:
         """Return the load parameters as the core takes them."""
         numbers = {("scene", name): value for name, value in asdict(self).items()}
-        return scene._control_layout.packed(numbers, scene._control_layout.zeros())
+        return scene._load_parameter_layout.packed(numbers, scene._load_parameter_layout.zeros())
 
 
 class Problem:
-    """A scene with the controls and the magnetization under which it is looked at."""
+    """A scene with the load parameters and the magnetization under which it is looked at."""
 
-    def __init__(self, scene: ms.Scene, controls: Controls, magnetization: np.ndarray | None = None):
+    def __init__(
+        self, scene: ms.Scene, load_parameters: LoadParameters, magnetization: np.ndarray | None = None
+    ):
         self.scene, self.magnetization = scene, magnetization
-        self.controls = controls.of(scene)
+        self.load_parameters = load_parameters.of(scene)
         self.model = self.scene._model
         if magnetization is not None:
             rows = np.broadcast_to(magnetization, (scene.mesh.n_faces, 3))
@@ -57,14 +59,14 @@ class Problem:
         return order.astype(int)
 
     def energy(self, q: np.ndarray) -> float:
-        return self.model.energy(q, self.controls)
+        return self.model.energy(q, self.load_parameters)
 
     def gradient(self, q: np.ndarray) -> np.ndarray:
-        return np.asarray(self.model.gradient(q, self.controls))
+        return np.asarray(self.model.gradient(q, self.load_parameters))
 
     def hessian(self, q: np.ndarray, reduced: bool = False) -> np.ndarray:
         """Return the full dense Hessian; the core gives the lower triangle."""
-        size, starts, rows, values = self.model.hessian(q, self.controls, reduced=reduced)
+        size, starts, rows, values = self.model.hessian(q, self.load_parameters, reduced=reduced)
         lower = np.zeros((size, size))
         lower[rows, np.repeat(np.arange(size), np.diff(starts))] = values
         return lower + np.tril(lower, -1).T

@@ -108,7 +108,7 @@ class SolidModel:
         )
         self.layout = Layout(self.core.parameters)
         self.others = {key: np.zeros(1) for key in self.layout if key[0] != "body 0"}
-        self.controls = np.zeros(sum(entry[4] * entry[5] for entry in self.core.controls))
+        self.load_parameters = np.zeros(sum(entry[4] * entry[5] for entry in self.core.load_parameters))
         self.set(values_of(material) if values is None else values)
         marks = np.arange(3.0 * len(self.nodes)).reshape(-1, 3)
         self.order = np.asarray(self.core.state(marks, np.zeros(0))).astype(int)  # of the core's unknowns
@@ -127,16 +127,16 @@ class SolidModel:
         return self.core.state(np.asarray(x, dtype=float), np.zeros(0))
 
     def energy(self, x) -> float:
-        return self.core.energy(self.state(x), self.controls)
+        return self.core.energy(self.state(x), self.load_parameters)
 
     def gradient(self, x) -> np.ndarray:
         """Return the gradient in the caller's order, (3 n,)."""
         out = np.empty(self.nodes.size)
-        out[self.order] = self.core.gradient(self.state(x), self.controls)
+        out[self.order] = self.core.gradient(self.state(x), self.load_parameters)
         return out
 
     def hessian(self, x) -> np.ndarray:
-        size, starts, rows, numbers = self.core.hessian(self.state(x), self.controls, reduced=False)
+        size, starts, rows, numbers = self.core.hessian(self.state(x), self.load_parameters, reduced=False)
         lower = np.zeros((size, size))
         lower[rows, np.repeat(np.arange(size), np.diff(starts))] = numbers
         whole = np.empty_like(lower)
@@ -154,7 +154,7 @@ class SolidModel:
         return {key: self.layout.of(found, *key) for key in self.others}
 
     def _vjp(self, x, adjoint) -> np.ndarray:
-        return np.asarray(_core.vjp(self.core, self.state(x), self.controls, self.state(adjoint))[0])
+        return np.asarray(_core.vjp(self.core, self.state(x), self.load_parameters, self.state(adjoint))[0])
 
 
 def shape_gradients(nodes, tetrahedra):

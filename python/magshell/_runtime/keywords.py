@@ -9,18 +9,18 @@ from typing import Any
 from .solve_keywords import names_of
 
 FLUX_DENSITY = "applied_flux_density"
-CONTROLS = names_of("load parameter")
-FACTORS = tuple(name for name in CONTROLS if name != FLUX_DENSITY)
+LOAD_PARAMETERS = names_of("load parameter")
+FACTORS = tuple(name for name in LOAD_PARAMETERS if name != FLUX_DENSITY)
 OF_MOTION = names_of("damping")  # keywords of ms.simulate only
 
 
-def controls_of(owner, scene) -> tuple[str, ...]:
+def load_parameters_of(owner, scene) -> tuple[str, ...]:
     """Return the keywords of a solve that `values` may hold for an object, though they are no parameters in the core.
 
     These are all keywords for the scene, the flux density for its uniform field, and none for other objects.
     """
     if owner is scene:
-        return (*CONTROLS, *OF_MOTION)
+        return (*LOAD_PARAMETERS, *OF_MOTION)
     return (FLUX_DENSITY,) if getattr(owner, "_is_uniform", False) else ()
 
 
@@ -33,9 +33,13 @@ def as_keywords(scene, named: dict[Any, Any], known) -> dict[Any, Any]:
     values = named.get("values")
     if not isinstance(values, dict):
         return named
-    kept, controls = {}, {}
+    kept, load_parameters = {}, {}
     for owner, of_owner in values.items():
-        its_own = controls_of(owner, scene) if any(owner is each for each in (scene, *_fields(scene))) else ()
+        its_own = (
+            load_parameters_of(owner, scene)
+            if any(owner is each for each in (scene, *_fields(scene)))
+            else ()
+        )
         if not isinstance(of_owner, dict) or not its_own:
             kept[owner] = of_owner
             continue
@@ -45,12 +49,12 @@ def as_keywords(scene, named: dict[Any, Any], known) -> dict[Any, Any]:
                 continue
             if named.get(name) is not None:
                 raise ValueError(f"{name} was given twice: as an argument and in values")
-            if name in controls:
+            if name in load_parameters:
                 raise ValueError(f"{name} was given twice in values: of the scene and of its UniformField")
-            controls[name] = rest.pop(name)
+            load_parameters[name] = rest.pop(name)
         if rest or not of_owner:
             kept[owner] = rest
-    return {**named, **controls, "values": kept or None}
+    return {**named, **load_parameters, "values": kept or None}
 
 
 def check_known(function: str, named, known, groups: dict[str, type[Any]]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from .._input.quantity import quantity
 from .._input.tensors import is_tensor
 from .._runtime.frozen import Frozen
-from .._runtime.keywords import CONTROLS, FLUX_DENSITY, controls_of, nearest_first
+from .._runtime.keywords import FLUX_DENSITY, LOAD_PARAMETERS, load_parameters_of, nearest_first
 from ..model.scene.time_varying import may_jump, names_in_time, row_in_time
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Action(Frozen):
         self.owner, self.name = owner, name
         self._of_scene = hasattr(owner, "bodies") and hasattr(owner, "supports")
         if self._of_scene:
-            known = CONTROLS
+            known = LOAD_PARAMETERS
             self.shape: tuple[int, ...] = (3,) if name == FLUX_DENSITY else ()
         else:
             known = names_in_time(owner)
@@ -102,7 +102,7 @@ class Action(Frozen):
         """Raise ValueError unless the owner is the scene or one of its objects."""
         if not any(self.owner is each for each in (scene, *scene.objects)):
             raise ValueError(f"{self!r} is about something that is neither the scene nor one of its objects")
-        if self._of_scene and self.name not in controls_of(self.owner, scene):
+        if self._of_scene and self.name not in load_parameters_of(self.owner, scene):
             raise ValueError(f"the scene has no {self.name}")
 
     def value(self, action: Any, time: float, before: Any) -> Any:

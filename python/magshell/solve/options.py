@@ -72,7 +72,7 @@ class Adaptive:
 
     interval: the spacing of the motion's time grid, s; `steps` counts these intervals. States are recorded and arrays in
         time are given at the grid's times, and no step goes beyond one. Choose it as long as a step may be, and so that
-        controls have kinks and jumps only at these times. A tensor has a gradient.
+        load parameters have kinks and jumps only at these times. A tensor has a gradient.
     tolerance: of the error of the positions after one step, m, as the root mean square over vertices (that of
         Trajectory.step_errors). By default 1e-4 of the extent, the diagonal of the largest body's bounding box; the error of
         a few hundred steps together is then a few percent of the extent at most.

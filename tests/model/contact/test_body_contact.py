@@ -26,17 +26,17 @@ def symmetric_matrix(size, starts, rows, values):
 @pytest.mark.parametrize("law", ["barrier", "penalty"])
 def test_hessian_and_gradient_are_those_of_the_energy(law):
     scene = two_sheets(law=law)
-    model, controls = scene._model, scene._control_layout.zeros()
+    model, load_parameters = scene._model, scene._load_parameter_layout.zeros()
     q = state_in_contact(scene)
-    assert model.refusal(q) == "" and model.energies(q, controls)["body contact"] > 0.0
-    hessian = symmetric_matrix(*model.hessian(q, controls, reduced=False))
+    assert model.refusal(q) == "" and model.energies(q, load_parameters)["body contact"] > 0.0
+    hessian = symmetric_matrix(*model.hessian(q, load_parameters, reduced=False))
     p, step = np.random.default_rng(1).standard_normal(len(q)), 1e-9
-    above, below = (model.gradient(q + sign * step * p, controls) for sign in (1, -1))
+    above, below = (model.gradient(q + sign * step * p, load_parameters) for sign in (1, -1))
     difference = (above - below) / (2 * step)
     assert np.abs(hessian @ p - difference).max() < 1e-5 * np.abs(difference).max()
-    energies = [model.energy(q + sign * step * p, controls) for sign in (1, -1)]
+    energies = [model.energy(q + sign * step * p, load_parameters) for sign in (1, -1)]
     assert (energies[0] - energies[1]) / (2 * step) == pytest.approx(
-        model.gradient(q, controls) @ p, rel=1e-6
+        model.gradient(q, load_parameters) @ p, rel=1e-6
     )
 
 
@@ -55,12 +55,12 @@ def test_reduced_hessian_is_that_of_the_free_unknowns():
         gravity=DOWN,
         allow_rigid_motions=True,
     )
-    model, controls = scene._model, scene._control_layout.zeros()
+    model, load_parameters = scene._model, scene._load_parameter_layout.zeros()
     positions = scene.mesh.rest_positions.copy()
     positions[PLATE.n_vertices :, 2] -= 7e-5
     q = model.state(positions, np.zeros(scene.mesh.n_edges))
-    free = symmetric_matrix(*model.hessian(q, controls))
-    full = symmetric_matrix(*model.hessian(q, controls, reduced=False)).toarray()
+    free = symmetric_matrix(*model.hessian(q, load_parameters))
+    full = symmetric_matrix(*model.hessian(q, load_parameters, reduced=False)).toarray()
     lift = np.stack([model.expand(each) for each in np.eye(model.free_size)], axis=1)
     # Nodes of the rigid body move on curves; their curvature adds to its six rows and columns, the last ones.
     n = model.free_size - 6

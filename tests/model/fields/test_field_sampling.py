@@ -122,7 +122,7 @@ def estimate(scene, **values) -> float:
     state, turns, from_, _ = starting_point(scene, None, inputs)
     with inputs.in_core():
         found = ms._core.find_equilibrium(
-            scene._model, state, turns, from_, inputs.controls, ms._core.StaticsOptions()
+            scene._model, state, turns, from_, inputs.load_parameters, ms._core.StaticsOptions()
         )
     return found.field_sampling_error
 

@@ -25,7 +25,9 @@ def pair_of_plates(cells, offset, **law):
 def force_on_second(scene, magnetization):
     inputs, model = Inputs(scene, magnetization, None), scene._model
     with inputs.in_core():
-        gradient = model.positions(model.term_gradient("own field", model.rest_state(), inputs.controls))
+        gradient = model.positions(
+            model.term_gradient("own field", model.rest_state(), inputs.load_parameters)
+        )
     return -gradient[scene.bodies[0].mesh.n_vertices :].sum(axis=0)
 
 
@@ -90,7 +92,9 @@ LAWS = ["stretches", "rotates"]
 def test_force_and_torque_of_a_closed_system_vanish(components, law):
     scene, inputs, state = random_pair(components=components, magnetization_law=law)
     with inputs.in_core():
-        gradient = scene._model.positions(scene._model.term_gradient("own field", state, inputs.controls))
+        gradient = scene._model.positions(
+            scene._model.term_gradient("own field", state, inputs.load_parameters)
+        )
         positions = scene._model.positions(state)
     total = np.linalg.norm(gradient, axis=1).sum()
     assert np.linalg.norm(gradient.sum(axis=0)) < 1e-14 * total
@@ -101,7 +105,7 @@ def test_force_and_torque_of_a_closed_system_vanish(components, law):
 @pytest.mark.parametrize("components", KINDS.values(), ids=KINDS)
 def test_gradient_and_hessian_product_agree_with_differences(components, law):
     scene, inputs, state = random_pair(components=components, magnetization_law=law)
-    model, controls = scene._model, inputs.controls
+    model, load_parameters = scene._model, inputs.load_parameters
     rng = np.random.default_rng(1)
     direction = np.zeros_like(state)
     direction[: 3 * scene.mesh.n_vertices] = rng.normal(size=3 * scene.mesh.n_vertices)
@@ -114,12 +118,12 @@ def test_gradient_and_hessian_product_agree_with_differences(components, law):
         return (8 * (at(1) - at(-1)) - (at(2) - at(-2))) / (12 * step)
 
     with inputs.in_core():
-        gradient = model.term_gradient("own field", state, controls)
-        product = model.hessian_product(state, controls, direction) - model.hessian_product(
-            state, 0 * controls, direction
+        gradient = model.term_gradient("own field", state, load_parameters)
+        product = model.hessian_product(state, load_parameters, direction) - model.hessian_product(
+            state, 0 * load_parameters, direction
         )
-        slope = differentiated(lambda q: model.energies(q, controls)["own field"])
-        change = differentiated(lambda q: model.term_gradient("own field", q, controls))
+        slope = differentiated(lambda q: model.energies(q, load_parameters)["own field"])
+        change = differentiated(lambda q: model.term_gradient("own field", q, load_parameters))
     assert abs(slope - gradient @ direction) < 1e-7 * abs(slope)
     assert np.abs(change - product).max() < 1e-7 * np.abs(product).max()
 
@@ -136,11 +140,11 @@ def test_derivatives_by_the_magnetization_of_every_face_agree_with_differences(m
     def along(m):
         inputs = Inputs(scene, m, None)
         with inputs.in_core():
-            return adjoint @ scene._model.term_gradient("own field", state, inputs.controls)
+            return adjoint @ scene._model.term_gradient("own field", state, inputs.load_parameters)
 
     inputs = Inputs(scene, base, None)
     with inputs.in_core():
-        found = _core.vjp(scene._model, state, inputs.controls, adjoint)[0]
+        found = _core.vjp(scene._model, state, inputs.load_parameters, adjoint)[0]
     by_body = [scene._value_layout.of(found, f"body {k}", "remanent_magnetization") for k in range(2)]
     step = 1e-3
     differences = (along(base + step * change) - along(base - step * change)) / (2 * step)
@@ -182,7 +186,7 @@ def magnetic_bending_stiffness(length, width, cells, magnetization):
         inputs = Inputs(scene, magnetization, None)
         with inputs.in_core():
             state = scene._model.state(positions, np.zeros(scene._bodies.n_rotations))
-            energies.append(scene._model.energies(state, inputs.controls)["own field"])
+            energies.append(scene._model.energies(state, inputs.load_parameters)["own field"])
     return 2 * (energies[1] - energies[0]) / (0.2**2 / length)
 
 
@@ -212,7 +216,9 @@ def test_stretched_plates_with_a_rotating_magnetization_have_the_charges_of_thei
         positions = scene.mesh.rest_positions * [stretch, 1.0, 1.0]
         with inputs.in_core():
             state = scene._model.state(positions, np.zeros(scene._bodies.n_rotations))
-            forces = -scene._model.positions(scene._model.term_gradient("own field", state, inputs.controls))
+            forces = -scene._model.positions(
+                scene._model.term_gradient("own field", state, inputs.load_parameters)
+            )
         found = forces[scene.bodies[0].mesh.n_vertices :].sum(axis=0)
         exact = cuboid_force(now, now, offset, 0, polarization)
         assert abs(found[2] / exact[2] - 1) < 3e-4
@@ -228,7 +234,7 @@ def test_bent_sheet_has_the_same_own_field_under_both_laws():
         inputs = Inputs(scene, (5e4, 0, 3e4), None)
         with inputs.in_core():
             state = scene._model.state(positions, np.zeros(scene._bodies.n_rotations))
-            found.append(scene._model.energies(state, inputs.controls)["own field"])
+            found.append(scene._model.energies(state, inputs.load_parameters)["own field"])
     assert found[1] == pytest.approx(found[0], rel=1e-9)
 
 
@@ -239,7 +245,7 @@ def test_own_field_has_the_same_bits_for_every_number_of_threads():
         for threads in (1, 2, 3):
             _core.set_num_threads(threads)
             with inputs.in_core():
-                found.append(scene._model.term_gradient("own field", state, inputs.controls))
+                found.append(scene._model.term_gradient("own field", state, inputs.load_parameters))
     finally:
         _core.set_num_threads(before)
     assert all(np.array_equal(found[0], each) for each in found[1:])

@@ -56,7 +56,9 @@ def test_force_and_torque_of_sheets_and_moments_vanish():
     scene, *_ = two_flaps()
     inputs, state, count = moved_state(scene)
     with inputs.in_core():
-        gradient = scene._model.term_gradient("own field", state, inputs.controls)[:count].reshape(-1, 3)
+        gradient = scene._model.term_gradient("own field", state, inputs.load_parameters)[:count].reshape(
+            -1, 3
+        )
     total = np.linalg.norm(gradient, axis=1).sum()
     assert total > 0
     assert np.linalg.norm(gradient.sum(axis=0)) < 1e-14 * total
@@ -79,12 +81,12 @@ def test_gradient_and_hessian_product_with_moments_agree_with_differences():
         return (8 * (at(1) - at(-1)) - (at(2) - at(-2))) / (12 * step)
 
     with inputs.in_core():
-        gradient = model.term_gradient("own field", state, inputs.controls)
-        product = model.hessian_product(state, inputs.controls, direction) - model.hessian_product(
-            state, 0 * inputs.controls, direction
+        gradient = model.term_gradient("own field", state, inputs.load_parameters)
+        product = model.hessian_product(state, inputs.load_parameters, direction) - model.hessian_product(
+            state, 0 * inputs.load_parameters, direction
         )
-        slope = differentiated(lambda q: model.energies(q, inputs.controls)["own field"])
-        change = differentiated(lambda q: model.term_gradient("own field", q, inputs.controls))
+        slope = differentiated(lambda q: model.energies(q, inputs.load_parameters)["own field"])
+        change = differentiated(lambda q: model.term_gradient("own field", q, inputs.load_parameters))
     assert abs(slope - gradient @ direction) < 1e-7 * abs(slope)
     assert np.abs(change - product).max() < 1e-7 * np.abs(product).max()
 

@@ -29,12 +29,12 @@ def differentiated(shells, positions, magnetization, direction):
     with inputs.in_core():
         rotations = np.zeros(scene._bodies.n_rotations)
         state, along = model.state(positions, rotations), model.state(direction, rotations)
-        energy = model.energies(state, inputs.controls)["own field"]
-        gradient = model.positions(model.term_gradient("own field", state, inputs.controls))
-        product = model.hessian_product(state, inputs.controls, along) - model.hessian_product(
-            state, 0 * inputs.controls, along
+        energy = model.energies(state, inputs.load_parameters)["own field"]
+        gradient = model.positions(model.term_gradient("own field", state, inputs.load_parameters))
+        product = model.hessian_product(state, inputs.load_parameters, along) - model.hessian_product(
+            state, 0 * inputs.load_parameters, along
         )
-        by_values = _core.vjp(model, state, inputs.controls, along)[0]
+        by_values = _core.vjp(model, state, inputs.load_parameters, along)[0]
     rows = scene._value_layout.of(by_values, "body 0", "remanent_magnetization")
     return energy, gradient, model.positions(product), rows
 

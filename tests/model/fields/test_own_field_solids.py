@@ -34,13 +34,13 @@ def evaluated(scene, positions=None, magnetization=None, direction=None):
     at = scene.mesh.rest_positions if positions is None else positions
     with inputs.in_core():
         state = model.state(at, np.zeros(scene._bodies.n_rotations))
-        energy = model.energies(state, inputs.controls).get("own field", 0.0)
-        gradient = model.positions(model.term_gradient("own field", state, inputs.controls))
+        energy = model.energies(state, inputs.load_parameters).get("own field", 0.0)
+        gradient = model.positions(model.term_gradient("own field", state, inputs.load_parameters))
         if direction is None:
             return energy, gradient
         along = model.state(direction, np.zeros(scene._bodies.n_rotations))
-        product = model.hessian_product(state, inputs.controls, along) - model.hessian_product(
-            state, 0 * inputs.controls, along
+        product = model.hessian_product(state, inputs.load_parameters, along) - model.hessian_product(
+            state, 0 * inputs.load_parameters, along
         )
         return energy, gradient, model.positions(product)
 
@@ -194,7 +194,7 @@ def test_derivatives_by_the_magnetization_of_every_tetrahedron_agree_with_differ
     with inputs.in_core():
         state = scene._model.rest_state()
         full = scene._model.state(adjoint, np.zeros(scene._bodies.n_rotations))
-        found = _core.vjp(scene._model, state, inputs.controls, full)[0]
+        found = _core.vjp(scene._model, state, inputs.load_parameters, full)[0]
     rows = scene._value_layout.of(found, "body 1", "remanent_magnetization")
     assert abs(differences - np.sum(rows * change)) < 1e-8 * abs(differences)
 

@@ -32,13 +32,13 @@ def curled_sheet(components, accuracy, law="stretches"):
 
 def gradient_of(model, inputs, state):
     with inputs.in_core():
-        return model.term_gradient("own field", state, inputs.controls)
+        return model.term_gradient("own field", state, inputs.load_parameters)
 
 
 def product_of(model, inputs, state, direction):
     with inputs.in_core():
-        whole = model.hessian_product(state, inputs.controls, direction)
-        return whole - model.hessian_product(state, 0 * inputs.controls, direction)
+        whole = model.hessian_product(state, inputs.load_parameters, direction)
+        return whole - model.hessian_product(state, 0 * inputs.load_parameters, direction)
 
 
 @pytest.mark.parametrize("components", KINDS.values(), ids=KINDS)
@@ -86,7 +86,7 @@ def test_derivatives_by_magnetization_with_trees_equal_those_with_direct_sums():
     for accuracy in (None, 1e-6):
         model, inputs, state, direction = curled_sheet((1, 1, 0), accuracy)
         with inputs.in_core():
-            found.append(_core.vjp(model, state, inputs.controls, direction)[0])
+            found.append(_core.vjp(model, state, inputs.load_parameters, direction)[0])
     assert np.linalg.norm(found[1] - found[0]) < 2e-6 * np.linalg.norm(found[0])
 
 
@@ -101,6 +101,6 @@ def test_rough_products_are_close_to_exact_ones(components):
     model, inputs, state, direction = curled_sheet(components, 1e-6)
     exact = product_of(model, inputs, state, direction)
     with inputs.in_core():
-        rough = model.rough_operator_product(state, inputs.controls, direction)
+        rough = model.rough_operator_product(state, inputs.load_parameters, direction)
     error = np.linalg.norm(rough - exact)
     assert 0.0 < error < 2e-3 * np.linalg.norm(exact)

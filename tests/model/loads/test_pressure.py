@@ -27,8 +27,8 @@ def loose(body, *pressures) -> ms.Scene:
     return ms.Scene(body, loads=pressures, allow_rigid_motions=True)
 
 
-def controls(scene, load_factor: float) -> np.ndarray:
-    layout = scene._control_layout
+def load_parameters(scene, load_factor: float) -> np.ndarray:
+    layout = scene._load_parameter_layout
     return layout.packed({("scene", "load_factor"): load_factor}, layout.zeros())
 
 
@@ -41,7 +41,9 @@ def moved_state(scene, seed: int = 0) -> np.ndarray:
 def forces(scene, state) -> np.ndarray:
     """Compute the forces of the loads alone, (n_v, 3) in N."""
     model = scene._model
-    by_load = model.gradient(state, controls(scene, 0.0)) - model.gradient(state, controls(scene, 1.0))
+    by_load = model.gradient(state, load_parameters(scene, 0.0)) - model.gradient(
+        state, load_parameters(scene, 1.0)
+    )
     return model.positions(by_load)
 
 
@@ -93,11 +95,11 @@ def test_a_closed_surface_has_a_potential(element):
     """Compare the potential with p times the change of volume, and its two derivatives with differences."""
     body = curved_block(element)
     scene = loose(body, ms.Pressure(2e4))
-    model, state, on = scene._model, moved_state(scene), controls(scene, 1.0)
+    model, state, on = scene._model, moved_state(scene), load_parameters(scene, 1.0)
     moved = ms.TetMesh(model.positions(state), body.mesh.tetrahedra)
     change = moved.volume - body.mesh.volume
     assert model.energies(state, on)["pressure"] == pytest.approx(2e4 * change, rel=1e-12)
-    off = controls(scene, 0.0)
+    off = load_parameters(scene, 0.0)
     rng = np.random.default_rng(1)
     along, step = rng.standard_normal(model.size), 1e-4
     rise = [model.energies(state + amount * along, on)["pressure"] for amount in (step, -step)]
@@ -193,7 +195,7 @@ def test_equilibrium_and_gradient_without_a_potential(element):
     assert rest.iterations <= 14
     load, pin = scene.loads[0], scene.supports[0]
     free = np.setdiff1d(np.arange(scene.mesh.n_vertices), pin.vertices)
-    left = scene._model.positions(scene._model.gradient(rest._state, rest._controls))[free]
+    left = scene._model.positions(scene._model.gradient(rest._state, rest._load_parameters))[free]
     assert np.abs(left).max() < 1e-9 * np.abs(forces(scene, rest._state)).max()
     tolerance = {"solver": ms.MixedNewton(tolerance=1e-13)}
 

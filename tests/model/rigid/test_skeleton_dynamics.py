@@ -134,7 +134,7 @@ def in_state(angles, rates=(None,) * 5, torques=(None,) * 5, **scene):
 def test_mass_matrix_is_that_of_pinocchio(angles, mass_matrix):
     scene = in_state(angles)
     model = scene._model
-    size, starts, rows, _ = model.hessian(model.rest_state(), np.zeros(scene._control_layout.size))
+    size, starts, rows, _ = model.hessian(model.rest_state(), np.zeros(scene._load_parameter_layout.size))
     values = model.free_weight_values(scene._values.masses)
     found = np.zeros((size, size))
     for column in range(size):

@@ -7,7 +7,7 @@ import pytest
 from crossed_cells import crossed
 
 import magshell as ms
-from benchmarks.cases.magnetic_strip import ACROSS, LENGTH, WIDTH, controls
+from benchmarks.cases.magnetic_strip import ACROSS, LENGTH, WIDTH, load_parameters
 from benchmarks.cases.magnetic_strip import scene as clamped
 
 UP = (0.0, 0.0, 1.0)
@@ -15,7 +15,7 @@ UP = (0.0, 0.0, 1.0)
 
 def error_of(mesh, beta=1.0, bending="midedge") -> float:
     """Compute the relative error of the rise of a strip's end in a field across it, against the elastica."""
-    found = ms.equilibrium(clamped(mesh, bending), **controls(beta, UP))
+    found = ms.equilibrium(clamped(mesh, bending), **load_parameters(beta, UP))
     return found.positions[mesh.vertices_at(x=LENGTH), 2].mean() / LENGTH / ACROSS[beta][1] - 1.0
 
 
@@ -55,7 +55,7 @@ def test_obtuse_faces_at_the_border_are_warned_of_once_a_scene():
     with pytest.warns(
         ms.MeshQualityWarning, match=r"this equilibrium cannot be trusted.*177\.7.*almost flat"
     ) as told:
-        found = ms.equilibrium(scene, **controls(1.0, UP))
+        found = ms.equilibrium(scene, **load_parameters(1.0, UP))
     assert told[0].filename == __file__
     rise = found.positions[mesh.vertices_at(x=LENGTH), 2].mean() / LENGTH
     assert rise < 0.99 * ACROSS[1.0][1]  # the warning is justified: the sheet is too stiff
@@ -63,9 +63,9 @@ def test_obtuse_faces_at_the_border_are_warned_of_once_a_scene():
     assert np.degrees(mesh.quality.largest_angles[named]) > 177
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        ms.equilibrium(scene, **controls(2.0, UP))
+        ms.equilibrium(scene, **load_parameters(2.0, UP))
         ms.equilibrium(
-            clamped(mesh, "midedge"), **controls(0.01, UP)
+            clamped(mesh, "midedge"), **load_parameters(0.01, UP)
         )  # bent so little that it does not matter
 
 
@@ -75,9 +75,9 @@ def test_a_motion_and_a_path_warn_too():
     supports = [ms.Clamp(mesh.edges_at(x=0.0))]
     scenes = [ms.Scene(sheet, supports=supports, field=ms.UniformField()) for _ in range(2)]
     with pytest.warns(ms.MeshQualityWarning, match=r"the motion, at 0\.\d+ s, cannot be trusted"):
-        ms.simulate(scenes[0], steps=20, time_step=2e-2, **controls(1.0, UP), progress=False)
+        ms.simulate(scenes[0], steps=20, time_step=2e-2, **load_parameters(1.0, UP), progress=False)
     with pytest.warns(ms.MeshQualityWarning, match=r"the path, at parameter .* cannot be trusted"):
-        ms.follow_path(scenes[1], **controls(1.0, UP), progress=False)
+        ms.follow_path(scenes[1], **load_parameters(1.0, UP), progress=False)
 
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])

@@ -84,25 +84,25 @@ def test_a_state_has_the_bits_of_two_scenes(pair, rng):
     moved = [s.mesh.rest_positions + 1e-4 * rng.standard_normal((s.mesh.n_vertices, 3)) for s in sheets]
     turned = [1e-2 * rng.standard_normal(s.mesh.n_edges) for s in sheets]
     given = {"field_factor": 0.7, "load_factor": 0.6, "gravity_factor": 0.8, "applied_flux_density": STRONG}
-    layout = scene._control_layout
-    controls = layout.packed({("scene", name): each for name, each in given.items()}, layout.zeros())
+    layout = scene._load_parameter_layout
+    load_parameters = layout.packed({("scene", name): each for name, each in given.items()}, layout.zeros())
     state = scene._model.state(np.concatenate(moved), np.concatenate(turned))
-    gradient = scene._model.gradient(state, controls)
-    hessian = symmetric(scene._model.hessian(state, controls, reduced=False))
+    gradient = scene._model.gradient(state, load_parameters)
+    hessian = symmetric(scene._model.hessian(state, load_parameters, reduced=False))
     energies = dict.fromkeys(scene._model.term_names, 0.0)
     places = []
     for one, part, x, phi in zip(alone, scene._bodies.spans, moved, turned, strict=True):
         own = one._model.state(x, phi)
         here, there = unknowns(scene._model, part.vertices, part.edges), unknowns(one._model)
-        np.testing.assert_array_equal(gradient[here], one._model.gradient(own, controls)[there])
-        matrix = symmetric(one._model.hessian(own, controls, reduced=False))
+        np.testing.assert_array_equal(gradient[here], one._model.gradient(own, load_parameters)[there])
+        matrix = symmetric(one._model.hessian(own, load_parameters, reduced=False))
         np.testing.assert_array_equal(hessian[np.ix_(here, here)], matrix[np.ix_(there, there)])
-        for name, value in one._model.energies(own, controls).items():
+        for name, value in one._model.energies(own, load_parameters).items():
             energies[name] += value
         places.append(here)
     assert not hessian[np.ix_(*places)].any()
     elastic = {name: energies[name] for name in ("membrane", "bending", "magnetic")}
-    found = scene._model.energies(state, controls)
+    found = scene._model.energies(state, load_parameters)
     assert {name: found[name] for name in elastic} == elastic
     assert found == pytest.approx(energies, rel=1e-12)  # dead loads are summed over all vertices
 
@@ -324,7 +324,7 @@ def test_obtuse_faces_of_the_second_sheet_are_named_by_their_number_in_the_scene
     held = [ms.Clamp(each.mesh.edges_at(x=0.0), body=each) for each in (good, bad)]
     scene = ms.Scene([good, bad], supports=held, field=ms.UniformField())
     with pytest.warns(ms.MeshQualityWarning, match="this equilibrium cannot be trusted") as told:
-        ms.equilibrium(scene, **magnetic_strip.controls(1.0, (0.0, 0.0, 1.0)))
+        ms.equilibrium(scene, **magnetic_strip.load_parameters(1.0, (0.0, 0.0, 1.0)))
     named = int(str(told[0].message).split("among them ")[1].split()[0])
     assert np.degrees(scene.mesh.quality.largest_angles[named]) > 177
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from crossed_cells import crossed
 from directors import directors
-from model_access import Controls
+from model_access import LoadParameters
 
 import magshell as ms
 from magshell.model.scene.values import Values
@@ -111,7 +111,7 @@ def test_forces_and_moments_do_the_virtual_work_of_the_energy(bending):
         curvature_scale=random.uniform(0.3, 1.0, mesh.n_edges),
     )
     scene = ms.Scene(shell, allow_rigid_motions=True)
-    model, values, controls = scene._model, Values(scene), Controls().of(scene)
+    model, values, load_parameters = scene._model, Values(scene), LoadParameters().of(scene)
     model.set_values(values.numbers)
 
     def state(t):
@@ -129,7 +129,7 @@ def test_forces_and_moments_do_the_virtual_work_of_the_energy(bending):
         np.sum(mesh.face_areas[:, None, None] * force * rate)
         for force, rate in zip(forces, rates, strict=True)
     ]
-    energies = [dict(model.energies(state(t), controls)) for t in (-step, step)]
+    energies = [dict(model.energies(state(t), load_parameters)) for t in (-step, step)]
     for name, done in zip(("membrane", "bending"), work, strict=True):
         change = (energies[1][name] - energies[0][name]) / (2 * step)
         assert done == pytest.approx(change, rel=1e-6), name
@@ -137,7 +137,7 @@ def test_forces_and_moments_do_the_virtual_work_of_the_energy(bending):
         np.sum(mesh.face_areas[:, None, None] * force * strain)
         for force, strain in zip(forces, here[:2], strict=True)
     )
-    assert elastic == pytest.approx(sum(model.energies(state(0.0), controls).values()), rel=1e-10)
+    assert elastic == pytest.approx(sum(model.energies(state(0.0), load_parameters).values()), rel=1e-10)
 
 
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])

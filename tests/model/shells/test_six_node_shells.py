@@ -168,8 +168,8 @@ def test_a_curved_magnet_in_its_own_field():
 
 
 def _with_field(scene):
-    controls = scene._control_layout.zeros()
-    return scene._control_layout.packed({("scene", "field_factor"): 1.0}, controls)
+    load_parameters = scene._load_parameter_layout.zeros()
+    return scene._load_parameter_layout.packed({("scene", "field_factor"): 1.0}, load_parameters)
 
 
 def test_stress_of_a_bent_strip():

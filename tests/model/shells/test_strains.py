@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from directors import angle_about, directors
-from model_access import Controls, Problem
+from model_access import LoadParameters, Problem
 
 import magshell as ms
 from magshell.model.supports.supports import rotation_matrix
@@ -141,11 +141,11 @@ def test_strains_reproduce_the_energies(bending, rng):
     mesh = ms.meshes.rectangle(0.3, 0.2, cells=(6, 4), irregular=0.25, seed=7)
     thickness, nu = rng.uniform(1e-3, 3e-3, mesh.n_faces), 0.3
     shell = ms.Shell(mesh, thickness=thickness, young_modulus=YOUNG, poisson_ratio=nu, bending=bending)
-    problem = Problem(ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))]), Controls())
+    problem = Problem(ms.Scene(shell, supports=[ms.Clamp(mesh.edges_at(x=0.0))]), LoadParameters())
     positions = mesh.rest_positions + 2e-3 * rng.standard_normal(mesh.rest_positions.shape)
     q = problem.model.state(positions, 0.05 * rng.standard_normal(mesh.n_edges))
     rows = problem.model.principal_strains(q, thickness)
-    energies = problem.model.energies(q, problem.controls)
+    energies = problem.model.energies(q, problem.load_parameters)
 
     def integral(pair, weight):
         density = (1 - nu) * (pair**2).sum(axis=1) + nu * pair.sum(axis=1) ** 2

@@ -37,9 +37,9 @@ def in_field(solid, *sources, **more):
     return ms.Scene(solid, field=[ms.UniformField(), *sources], allow_rigid_motions=True, **more)
 
 
-def controls_of(scene, flux=FLUX, factor=0.8):
+def load_parameters_of(scene, flux=FLUX, factor=0.8):
     given = {("scene", "applied_flux_density"): flux, ("scene", "field_factor"): factor}
-    return scene._control_layout.packed(given, scene._control_layout.zeros())
+    return scene._load_parameter_layout.packed(given, scene._load_parameter_layout.zeros())
 
 
 def bent(scene):
@@ -124,13 +124,13 @@ def magnetized(element):
 def test_energy_and_forces_are_those_of_a_formula_in_torch(make, element):
     solid, formula = make(element)
     scene = in_field(solid, DIPOLES)
-    model, q, controls = scene._model, bent(scene), controls_of(scene)
+    model, q, load_parameters = scene._model, bent(scene), load_parameters_of(scene)
     x = torch.tensor(model.positions(q), requires_grad=True)
     energy = formula(solid, x)
     energy.backward()
-    idle = controls_of(scene, np.zeros(3), 0.0)
-    force = model.positions(model.gradient(q, controls) - model.gradient(q, idle))
-    assert model.energies(q, controls)["magnetic"] == pytest.approx(float(energy.detach()), rel=1e-12)
+    idle = load_parameters_of(scene, np.zeros(3), 0.0)
+    force = model.positions(model.gradient(q, load_parameters) - model.gradient(q, idle))
+    assert model.energies(q, load_parameters)["magnetic"] == pytest.approx(float(energy.detach()), rel=1e-12)
     np.testing.assert_allclose(force, x.grad.numpy(), atol=1e-9 * np.abs(force).max())
 
 
@@ -139,10 +139,10 @@ def test_energy_and_forces_are_those_of_a_formula_in_torch(make, element):
 def test_the_hessian_is_the_derivative_of_the_forces(make, element):
     scene = in_field(make(element)[0], DIPOLES)
     model, q = scene._model, bent(scene)
-    controls, idle = controls_of(scene), controls_of(scene, np.zeros(3), 0.0)
+    load_parameters, idle = load_parameters_of(scene), load_parameters_of(scene, np.zeros(3), 0.0)
 
     def magnetic(at):
-        return model.gradient(at, controls) - model.gradient(at, idle)
+        return model.gradient(at, load_parameters) - model.gradient(at, idle)
 
     def matrix(at_controls):
         size, starts, indices, values = model.hessian(q, at_controls, False)
@@ -154,7 +154,7 @@ def test_the_hessian_is_the_derivative_of_the_forces(make, element):
     step = 1e-5
     fourth = [magnetic(q + k * step * along) for k in (-2, -1, 1, 2)]
     expected = (fourth[0] - 8 * fourth[1] + 8 * fourth[2] - fourth[3]) / (12 * step)
-    found = (matrix(controls) - matrix(idle)) @ along
+    found = (matrix(load_parameters) - matrix(idle)) @ along
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
@@ -167,8 +167,8 @@ def test_uniform_magnetization_pushes_only_at_the_boundary(element):
     solid = block(element, magnetization=(2e4, 1e4, -3e4))
     scene = in_field(solid)
     model, q = scene._model, bent(scene)
-    controls, idle = controls_of(scene), controls_of(scene, np.zeros(3))
-    force = model.positions(model.gradient(q, controls) - model.gradient(q, idle))
+    load_parameters, idle = load_parameters_of(scene), load_parameters_of(scene, np.zeros(3))
+    force = model.positions(model.gradient(q, load_parameters) - model.gradient(q, idle))
     mesh = solid.mesh.first_order() if element == "quadratic" else solid.mesh
     x, wanted = solid.mesh.rest_positions, np.zeros_like(force)
     for face, area, normal in zip(mesh.faces, mesh.face_areas, mesh.face_normals, strict=True):
@@ -192,12 +192,12 @@ def test_same_bits_on_any_number_of_threads(element):
         remanent_magnetization=rows(mesh.n_tetrahedra, 1e3),
     )
     scene = in_field(solid, DIPOLES, loads=[ms.SurfaceTension(0.5)])
-    model, q, controls = scene._model, bent(scene), controls_of(scene)
+    model, q, load_parameters = scene._model, bent(scene), load_parameters_of(scene)
     before, found = ms.num_threads(), []
     try:
         for threads in (1, 2, 4):
             ms.set_num_threads(threads)
-            found.append((model.gradient(q, controls), model.hessian(q, controls, False)[3]))
+            found.append((model.gradient(q, load_parameters), model.hessian(q, load_parameters, False)[3]))
     finally:
         ms.set_num_threads(before)
     for other in found[1:]:

@@ -124,7 +124,7 @@ def test_area_loads_on_curved_faces():
 
 def _load_per_vertex(scene) -> np.ndarray:
     """Return the area that each vertex carries of a load of 1 N/m2 along z, in m2."""
-    layout, model = scene._control_layout, scene._model
+    layout, model = scene._load_parameter_layout, scene._model
     on = layout.packed({("scene", "load_factor"): 1.0}, layout.zeros())
     state = model.rest_state()
     by_load = model.gradient(state, layout.zeros()) - model.gradient(state, on)

@@ -38,7 +38,7 @@ def magnetized(cells, bending, beta=1.0):
     )
     scene = magnetic_strip.scene(mesh, bending)
     return (
-        ms.equilibrium(scene, **magnetic_strip.controls(beta, (0, 0, 1.0))),
+        ms.equilibrium(scene, **magnetic_strip.load_parameters(beta, (0, 0, 1.0))),
         mesh.vertices_at(x=magnetic_strip.LENGTH),
     )
 

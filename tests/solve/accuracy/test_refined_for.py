@@ -38,7 +38,7 @@ def pinched(n):
 def strip(cells=(20, 2)):
     mesh = ms.meshes.rectangle(magnetic_strip.LENGTH, magnetic_strip.WIDTH, cells)
     scene = magnetic_strip.scene(mesh, "midedge")
-    rest = ms.equilibrium(scene, **magnetic_strip.controls(1.0, (0, 0, 1.0)))
+    rest = ms.equilibrium(scene, **magnetic_strip.load_parameters(1.0, (0, 0, 1.0)))
     tip = mesh.vertices_at(x=magnetic_strip.LENGTH)
     return rest, lambda rest: rest.positions[tip, 2].mean() / magnetic_strip.LENGTH
 

@@ -106,7 +106,7 @@ def test_adaptive_motion_continues_another() -> None:
     assert distance(second, whole) < 1e-4
 
 
-def test_jump_of_a_control_ends_a_step() -> None:
+def test_jump_of_a_load_parameter_ends_a_step() -> None:
     """Let a field jump between two intervals: no step extends over that time."""
     mesh = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)

@@ -121,7 +121,7 @@ def test_stiffness_damping_is_beta_k_for_small_motions():
     assert lost == pytest.approx(beta * omega**2 * 4 * period, rel=0.03)
 
 
-def test_controls_may_be_given_in_four_ways(strip):
+def test_load_parameters_may_be_given_in_four_ways(strip):
     steps, dt = 8, 1e-3
     field = lambda t: np.array((0.0, 1e-3 * t / dt, 2e-3))  # noqa: E731
     ends = np.array([field(k * dt) for k in range(steps + 1)])

@@ -165,7 +165,7 @@ def test_bad_clocks_are_refused(tmp_path):
         ms.MotionState.load(tmp_path / "state.npz")
 
 
-def test_times_for_controls_go_on():
+def test_times_of_load_parameters_go_on():
     torch = pytest.importorskip("torch")
     first = simulate(strip(), FIRST)
     for start in (first, first.end):

@@ -197,9 +197,9 @@ def of_body(body, values):
 
 def nearest(scene, move) -> float:
     """Return the largest barrier energy of the contact [J], zero where the distance exceeds the activation distance."""
-    controls, rotations = scene._control_layout.zeros(), np.zeros(scene.mesh.n_edges)
+    load_parameters, rotations = scene._load_parameter_layout.zeros(), np.zeros(scene.mesh.n_edges)
     states = [scene._model.state(x, rotations) for x in move.positions]
-    return max(scene._model.energies(q, controls)["body contact"] for q in states)
+    return max(scene._model.energies(q, load_parameters)["body contact"] for q in states)
 
 
 @pytest.mark.parametrize("friction", [None, 0.3])

@@ -119,7 +119,9 @@ def test_the_modes_solve_the_problem():
     zero = model.state(0 * found.modes[0], 0 * found.edge_rotations[0])
     for k in range(4):
         mode = model.state(found.modes[k], found.edge_rotations[k]) - zero
-        gradients = [model.gradient(rest._state + sign * step * mode, rest._controls) for sign in (1, -1)]
+        gradients = [
+            model.gradient(rest._state + sign * step * mode, rest._load_parameters) for sign in (1, -1)
+        ]
         forces = (gradients[0] - gradients[1]) / (2 * step)
         inertia = found.squares[k] * model.full_vector(masses[:, None] * found.modes[k])
         np.testing.assert_allclose(
@@ -185,12 +187,12 @@ def test_values_of_the_equilibrium_are_used():
     np.testing.assert_allclose(ms.vibration_modes(scene, count=1).frequencies, plain, rtol=1e-12)
 
 
-def frequency_in_time(scene, start, mode, steps, time_step, **controls):
+def frequency_in_time(scene, start, mode, steps, time_step, **load_parameters):
     """Return the frequency of the motion from `start` (n_v, 3) along a mode's displacement, by its zero crossings,
     Hz.
     """
     move = ms.simulate(
-        scene, steps=steps, time_step=time_step, start=start + mode, progress=False, **controls
+        scene, steps=steps, time_step=time_step, start=start + mode, progress=False, **load_parameters
     )
     share = np.einsum("tvi,vi->t", move.positions - start, scene.shell.vertex_masses[:, None] * mode)
     before = np.flatnonzero(share[:-1] * share[1:] < 0)

@@ -16,9 +16,9 @@ def cantilever(young_modulus, density=1e3):
 
 @pytest.mark.parametrize("solver", [ms.MixedNewton, ms.Newton])
 def test_a_search_gives_up_at_its_number_of_factorizations_and_says_what_it_saw(solver):
-    scene, controls = oblique_field(150, 20.0)
+    scene, load_parameters = oblique_field(150, 20.0)
     with pytest.raises(ms.NotConverged) as caught:
-        ms.equilibrium(scene, **controls, solver=solver(max_factorizations=6))
+        ms.equilibrium(scene, **load_parameters, solver=solver(max_factorizations=6))
     text, last = str(caught.value), caught.value.last_good
     assert last.factorizations <= 6 + 2  # what was reached is made exact
     assert "it gave up after 6 factorizations (max_factorizations of the solver)" in text

@@ -27,8 +27,8 @@ ROOF_EXACT = 0.30060154  # isogeometric, PENGoLINS: the case B1 of the reference
 
 def strip(mesh, beta: float = 5.0) -> ms.Equilibrium:
     """Solve case C1-90: a magnetised strip in a field across it."""
-    controls = magnetic_strip.controls(beta, (0.0, 0.0, 1.0))
-    return ms.equilibrium(magnetic_strip.scene(mesh, "midedge"), **controls)
+    load_parameters = magnetic_strip.load_parameters(beta, (0.0, 0.0, 1.0))
+    return ms.equilibrium(magnetic_strip.scene(mesh, "midedge"), **load_parameters)
 
 
 def strip_mesh(n: int) -> ms.TriangleMesh:

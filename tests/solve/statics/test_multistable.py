@@ -1,4 +1,4 @@
-"""ms.find_equilibria: the equilibria of one scene at the same controls."""
+"""ms.find_equilibria: the equilibria of one scene at the same load parameters."""
 
 import numpy as np
 import pytest
@@ -104,10 +104,12 @@ def test_single_equilibrium_is_found_once():
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(6, 1))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
-    controls = {"remanent_magnetization": (4e4, 0, 0), "applied_flux_density": (0, 0, 2e-3)}
-    found = ms.find_equilibria(scene, **controls, attempts=8)
+    load_parameters = {"remanent_magnetization": (4e4, 0, 0), "applied_flux_density": (0, 0, 2e-3)}
+    found = ms.find_equilibria(scene, **load_parameters, attempts=8)
     assert len(found) == 1
-    np.testing.assert_allclose(found[0].positions, ms.equilibrium(scene, **controls).positions, atol=1e-9)
+    np.testing.assert_allclose(
+        found[0].positions, ms.equilibrium(scene, **load_parameters).positions, atol=1e-9
+    )
 
 
 def test_starts_of_ones_own():

@@ -28,8 +28,8 @@ from benchmarks.statics import oblique_field, semi_cylinder, strongly_bent
     ],
 )
 def test_a_field_from_behind(angle, beta, most):
-    scene, controls = oblique_field(angle, beta)
-    found = ms.equilibrium(scene, **controls)
+    scene, load_parameters = oblique_field(angle, beta)
+    found = ms.equilibrium(scene, **load_parameters)
     assert found.stable and found.saddles_escaped == 0
     assert found.factorizations <= most
     # where the field leads as it turns from 30 degrees to its angle, without a jump
@@ -44,8 +44,8 @@ def test_strongly_bent_sheet_takes_10_factorizations_in_one_load_step_on_every_m
     """Check steps of 2.51, 1.37, 1.60, 0.77, ... of the extent: a third step longer than the second is no
     divergence.
     """
-    scene, controls = strongly_bent(faces)
-    found = ms.equilibrium(scene, **controls)
+    scene, load_parameters = strongly_bent(faces)
+    found = ms.equilibrium(scene, **load_parameters)
     assert found.stable
     assert found.load_steps == 1 and found.factorizations <= 10
 
@@ -125,7 +125,7 @@ def test_a_strip_buckles_to_the_side_that_its_load_pushes():
 
 def test_state_of_an_early_end_is_an_equilibrium():
     """Check that the state in an error is converged, except after Ctrl-C; intermediate states are inexact."""
-    scene, controls = oblique_field(150, 50.0, cells=(120, 12))
+    scene, load_parameters = oblique_field(150, 50.0, cells=(120, 12))
     with pytest.raises(ms.NotConverged) as caught:
         ms.equilibrium(semi_cylinder(8, 2000.0), solver=ms.MixedNewton(max_relaxation_steps=1))
     assert 0.0 < caught.value.last_good.load_fraction < 1.0
@@ -136,10 +136,10 @@ def test_state_of_an_early_end_is_an_equilibrium():
             raise KeyboardInterrupt
 
     with pytest.raises(ms.Interrupted) as stopped:
-        ms.equilibrium(scene, progress=stop, **controls)
+        ms.equilibrium(scene, progress=stop, **load_parameters)
     last = stopped.value.last_good  # at once, as it was
     assert 0.0 < last.load_fraction < 1.0 and last.residual < 0.5
-    there = ms.equilibrium(scene, start=last, **controls)
+    there = ms.equilibrium(scene, start=last, **load_parameters)
     assert there.stable and there.load_fraction == 1.0 and there.residual <= 1e-10
 
 

@@ -73,7 +73,7 @@ def having_fine_faces(inputs: Inputs, numbers: np.ndarray) -> Inputs:
 
 
 def with_fine_faces(
-    inputs: Inputs, state: np.ndarray, controls: np.ndarray, estimate: float | None = None
+    inputs: Inputs, state: np.ndarray, load_parameters: np.ndarray, estimate: float | None = None
 ) -> Inputs:
     """Return the inputs with more fine faces, as the fields in a state need them; the inputs themselves if they need none.
 
@@ -86,18 +86,18 @@ def with_fine_faces(
         if _is_far(inputs.values, state):
             return inputs
         with inputs.in_core():
-            estimate = scene._model.field_sampling_error(state, controls)
+            estimate = scene._model.field_sampling_error(state, load_parameters)
     if not is_suspect(estimate):
         return inputs
     positions = scene._model.positions(state)
     if any(field._in_magnets(positions).any() for field in map(inputs.values.current, scene.fields)):
         return inputs  # the field has another formula inside of a magnet, and fine faces would not mend that
-    layout = scene._control_layout
+    layout = scene._load_parameter_layout
     errors = sampling_errors(
         inputs.values,
         positions,
-        float(layout.of(controls, "scene", "field_factor")[0]),
-        layout.of(controls, "scene", "applied_flux_density")[0],
+        float(layout.of(load_parameters, "scene", "field_factor")[0]),
+        layout.of(load_parameters, "scene", "applied_flux_density")[0],
     )
     numbers = {}
     for each in errors:

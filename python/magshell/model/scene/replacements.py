@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..._input.keyword_value import keyword_value
 from ..._input.quantity import quantity
-from ..._runtime.keywords import controls_of, meant, nearest_first
+from ..._runtime.keywords import load_parameters_of, meant, nearest_first
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ..loads.loads import DeadLoad
 from ..shells.shell import Shell
@@ -82,9 +82,9 @@ def _check(scene, owner, named) -> None:
         raise ValueError(f"values has a key that is not the scene, nor an object of it: {owner!r}")
     if not isinstance(named, dict):
         raise ValueError(f"values of {owner!r} must be a dict {{name: value}}, got {type(named).__name__}")
-    names = (*getattr(owner, "_replaceable", ()), *controls_of(owner, scene))
+    names = (*getattr(owner, "_replaceable", ()), *load_parameters_of(owner, scene))
     for name in named:
-        if name in controls_of(owner, scene):  # a solve that has it has taken it already
+        if name in load_parameters_of(owner, scene):  # a solve that has it has taken it already
             raise ValueError(f"{name} of the scene has no part in this solve: leave it out of values")
         if name not in names:
             what = f"it has {nearest_first(name, names)}" if names else "it has none that can be"

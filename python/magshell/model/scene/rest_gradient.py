@@ -81,7 +81,7 @@ def _by_rest_of_held(inputs: Inputs, prescribed: AtNodes) -> AtNodes:
     """Return the gradient by where supports hold nodes at rest, from that by where they hold them in this solve."""
     constraints, scene = inputs.values.constraints, inputs.scene
     rows = np.concatenate([prescribed.vertices, prescribed.directions])
-    factor = float(scene._control_layout.of(inputs.controls, "scene", "support_factor")[0])
+    factor = float(scene._load_parameter_layout.of(inputs.load_parameters, "scene", "support_factor")[0])
     turns = [rotation_matrix(factor * move.rotation) for move in constraints.moves]
     found = np.zeros_like(rows)
     nodes, counts = constraints.held_nodes[:, 0], constraints.held_nodes[:, 1]

@@ -233,7 +233,7 @@ class Scene(PlotMixin):
                 "the supports hold all vertices, so that nothing moves in the own field: leave at least one free"
             )
         self._value_layout = Layout(self._model.parameters)
-        self._control_layout = Layout(self._model.controls)
+        self._load_parameter_layout = Layout(self._model.load_parameters)
         self._values = Values(self)
         with self._values.in_core():
             pass

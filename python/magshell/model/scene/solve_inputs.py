@@ -87,11 +87,15 @@ class Inputs:
         flux_density = self._flux_density(applied_flux_density)
         if numbers is not None:
             check_on_skins(scene, np.asarray(numbers))
-        controls = {("scene", name): float(self.keyword(name, value)) for name, value in factors.items()}
-        controls["scene", "applied_flux_density"] = flux_density
+        load_parameters = {
+            ("scene", name): float(self.keyword(name, value)) for name, value in factors.items()
+        }
+        load_parameters["scene", "applied_flux_density"] = flux_density
         if scene.own_field is not None:
-            controls["scene", "own_field_factor"] = 1.0
-        self.controls: np.ndarray = scene._control_layout.packed(controls, scene._control_layout.zeros())
+            load_parameters["scene", "own_field_factor"] = 1.0
+        self.load_parameters: np.ndarray = scene._load_parameter_layout.packed(
+            load_parameters, scene._load_parameter_layout.zeros()
+        )
         self.values: Values = self._values(replaced)
         given = of_all_bodies(scene, replaced) if remanent_magnetization is None else remanent_magnetization
         own = given is None or is_tensor(given)

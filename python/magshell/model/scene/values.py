@@ -290,7 +290,7 @@ class Values:
 class Gradient:
     """The core's gradient of a scalar by all values and load parameters of a scene.
 
-    values: (n,). controls: (m,), or (time points, m) of a motion. others: {name: gradient} by the further inputs of a
+    values: (n,). load_parameters: (m,), or (time points, m) of a motion. others: {name: gradient} by the further inputs of a
     motion. rest: the gradients by rest positions (n_v, 3) and directions across edges (n_d, 3), through the shape of
     bodies at rest, and the same by where supports hold them; or None.
     """
@@ -299,11 +299,11 @@ class Gradient:
         self,
         scene: Scene,
         values: np.ndarray,
-        controls: np.ndarray,
+        load_parameters: np.ndarray,
         others: dict[Any, Any] | None = None,
         rest: Any = None,
     ):
-        self._scene, self._values, self._controls = scene, values, controls
+        self._scene, self._values, self._load_parameters = scene, values, load_parameters
         self.rest = rest
         self.others: dict[Any, Any] = others or {}
         self.of_owners: dict[Any, Any] = {}  # cache of Values.gradients: {object: {name: array}}
@@ -316,18 +316,18 @@ class Gradient:
         """Return the gradient by one value of an object, (rows, width), or (rows,) for single numbers."""
         return self._scene._value_layout.of(self._values, owner, name)
 
-    def control(self, owner: str, name: str) -> np.ndarray:
+    def load_parameter(self, owner: str, name: str) -> np.ndarray:
         """Return the gradient by a load parameter; of a motion (time points, rows, width)."""
-        return self._scene._control_layout.of(self._controls, owner, name)
+        return self._scene._load_parameter_layout.of(self._load_parameters, owner, name)
 
     @property
     def of_values(self) -> np.ndarray:
         """The gradient by all values, (n,)."""
         return self._values
 
-    def of_controls(self, part: slice) -> np.ndarray:
+    def of_load_parameters(self, part: slice) -> np.ndarray:
         """Return the gradient by a slice of the vector of load parameters."""
-        return self._controls[..., part]
+        return self._load_parameters[..., part]
 
     def own(self, name: str) -> np.ndarray:
         """Return the gradient by an argument of the solve itself: a load parameter, the magnetization, one of `others`."""
@@ -335,8 +335,8 @@ class Gradient:
             return self.others[name]
         if name == "remanent_magnetization":
             return gradient_by_all(self._scene, self)
-        by_control = self.control("scene", name)
-        return by_control[..., 0, :] if name == "applied_flux_density" else by_control[..., 0]
+        by_load_parameter = self.load_parameter("scene", name)
+        return by_load_parameter[..., 0, :] if name == "applied_flux_density" else by_load_parameter[..., 0]
 
 
 def _check_readable(item: object, values: dict[Any, Any]) -> None:

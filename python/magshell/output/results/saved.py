@@ -39,7 +39,7 @@ def check_fits(held: dict[Any, Any], scene: Scene) -> None:
         shapes["_own_velocities"] = (*n, own, 3)
         _check_end(held["end"], model)
     else:
-        shapes |= {"_state": (model.size,), "_controls": (scene._control_layout.size,)}
+        shapes |= {"_state": (model.size,), "_load_parameters": (scene._load_parameter_layout.size,)}
         _check_angle_branches(held["_angle_branches"])
     shapes["_own_points"] = (*n, own, 3)
     for name, shape in shapes.items():

@@ -324,7 +324,7 @@ def _held_by(result) -> dict[str, Any]:
     held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
     if isinstance(result, EquilibriumPath):
         flux_densities = result.applied_flux_densities
-        strengths = result._control("field_factor")[:, 0].tolist()
+        strengths = result._load_parameter("field_factor")[:, 0].tolist()
         titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
     elif isinstance(result, Trajectory):
         flux_densities = result.applied_flux_density
@@ -340,10 +340,10 @@ def _held_by(result) -> dict[str, Any]:
 
 
 def _field_factor(result) -> float:
-    controls = getattr(result, "_controls", None)
-    if controls is None:
+    load_parameters = getattr(result, "_load_parameters", None)
+    if load_parameters is None:
         return 1.0
-    return float(result.scene._control_layout.of(controls, "scene", "field_factor")[0])
+    return float(result.scene._load_parameter_layout.of(load_parameters, "scene", "field_factor")[0])
 
 
 def _states(

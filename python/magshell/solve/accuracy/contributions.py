@@ -74,7 +74,7 @@ def summing_to(parts: list[np.ndarray], total: float) -> list[np.ndarray]:
 def _relaxed(solution: FinerSolution, at_coarse: np.ndarray) -> np.ndarray:
     """Return a motion of all unknowns: as given at coarse vertices, (n, 3) m; no force acts on the others."""
     model = solution.scene._model
-    size, starts, rows, entries = model.hessian(solution.state_of_stiffness, solution.controls)
+    size, starts, rows, entries = model.hessian(solution.state_of_stiffness, solution.load_parameters)
     lower = scipy.sparse.csc_array((entries, rows, starts), shape=(size, size))
     motion = model.reduce(model.full_vector(solution.from_coarse(at_coarse)))
     # Unknowns of coarse vertices are marked; random numbers do not cancel where an unknown combines several of them.
@@ -94,6 +94,6 @@ def _relaxed(solution: FinerSolution, at_coarse: np.ndarray) -> np.ndarray:
 
 def _by_values(solution: FinerSolution, motion: np.ndarray, adjoint: np.ndarray) -> np.ndarray:
     """Return the derivatives of z . g by all values, g the gradient of the energy, in the state moved by `motion`."""
-    return _core.vjp(solution.scene._model, solution.state_of_stiffness + motion, solution.controls, adjoint)[
-        0
-    ]
+    return _core.vjp(
+        solution.scene._model, solution.state_of_stiffness + motion, solution.load_parameters, adjoint
+    )[0]

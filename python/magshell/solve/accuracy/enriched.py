@@ -47,9 +47,9 @@ class FinerSolution:
     """The solution on finer meshes of all bodies, and what the adjoint of an output needs.
 
     all_positions: of the vertices of the finer meshes, (n_v, 3) m. inputs: those of the solve.
-    state_of_stiffness, controls: all unknowns and load parameters where the stiffness is taken: at the solution, or at the
-    rest shape for a linear response. factorizations: the number that the search took. residual: the gradient of the energy
-    by all unknowns that a loose solve leaves; None for other solves.
+    state_of_stiffness, load_parameters: all unknowns and load parameters where the stiffness is taken: at the solution,
+    or at the rest shape for a linear response. factorizations: the number that the search took. residual: the gradient of
+    the energy by all unknowns that a loose solve leaves; None for other solves.
     """
 
     scene: Scene
@@ -57,7 +57,7 @@ class FinerSolution:
     all_positions: np.ndarray
     inputs: Inputs
     state_of_stiffness: np.ndarray
-    controls: np.ndarray
+    load_parameters: np.ndarray
     factorizations: int
     residual: np.ndarray | None
     _adjoint: Callable[[np.ndarray], np.ndarray]
@@ -94,7 +94,7 @@ def finer_solution(result: Equilibrium | LinearResponse, finer: tuple[FinerMesh,
     made = finer_scene(
         scene, result._values, {id(body): each for body, each in zip(scene.bodies, finer, strict=True)}
     )
-    inputs = inputs_of(made, load_parameters(result))
+    inputs = inputs_of(made, load_keywords(result))
     solved = _linear if isinstance(result, LinearResponse) else _nonlinear
     return solved(result, made, inputs, finer)
 
@@ -107,19 +107,19 @@ def positions_of(result: Equilibrium | LinearResponse) -> np.ndarray:
     return result.scene.mesh.rest_positions + moved
 
 
-def load_parameters(result: Equilibrium | LinearResponse) -> dict[str, Any]:
+def load_keywords(result: Equilibrium | LinearResponse) -> dict[str, Any]:
     """Return the load parameters of a result as keywords of a solve."""
-    layout, controls = result.scene._control_layout, result._controls
-    found: dict[str, Any] = {name: float(layout.of(controls, "scene", name)[0]) for name in FACTORS}
+    layout, load_parameters = result.scene._load_parameter_layout, result._load_parameters
+    found: dict[str, Any] = {name: float(layout.of(load_parameters, "scene", name)[0]) for name in FACTORS}
     if result.scene.has_uniform_field:
-        found["applied_flux_density"] = layout.of(controls, "scene", "applied_flux_density")[0].copy()
+        found["applied_flux_density"] = layout.of(load_parameters, "scene", "applied_flux_density")[0].copy()
     return found
 
 
 def _linear(
     result: LinearResponse, scene: Scene, inputs: Inputs, finer: tuple[FinerMesh, ...]
 ) -> FinerSolution:
-    model, controls = scene._model, scene._control_layout.zeros()
+    model, load_parameters = scene._model, scene._load_parameter_layout.zeros()
     with inputs.in_core():
         stiffness = RestStiffness(inputs)
         state = stiffness.response(inputs)
@@ -128,15 +128,15 @@ def _linear(
     def adjoint(by_positions: np.ndarray) -> np.ndarray:
         with inputs.in_core():
             pulled = gradient + model.full_vector(by_positions)
-            return model.small_deflection(rest, controls, controls, pulled).motion
+            return model.small_deflection(rest, load_parameters, load_parameters, pulled).motion
 
     places = scene.mesh.rest_positions + model.positions(state)
-    return FinerSolution(scene, finer, places, inputs, rest, controls, 1, None, adjoint)
+    return FinerSolution(scene, finer, places, inputs, rest, load_parameters, 1, None, adjoint)
 
 
 def equilibrium_on(result: Equilibrium, scene: Scene, finer: tuple[FinerMesh, ...]) -> Equilibrium:
     """Return the equilibrium of a scene on finer meshes near that on the coarse ones. Raises NotConverged."""
-    inputs = inputs_of(scene, load_parameters(result))
+    inputs = inputs_of(scene, load_keywords(result))
     start = _prolonged(result, scene, inputs, finer)
     solution, _ = _found(result, scene, inputs, start, Search(MixedNewton(), result.stable))
     _refuse_another(result, scene, start, solution)
@@ -149,7 +149,7 @@ def _prolonged(result: Equilibrium, scene: Scene, inputs: Inputs, finer: tuple[F
     placed = np.concatenate([positions_on(each, x) for x, each in parts])
     with inputs.in_core():
         start = scene._model.state(placed, np.zeros(scene._bodies.n_rotations))
-        return start + scene._model.driven_increment(start, inputs.controls)
+        return start + scene._model.driven_increment(start, inputs.load_parameters)
 
 
 def _refuse_another(result: Equilibrium, scene: Scene, start: np.ndarray, solution: Solution) -> None:
@@ -193,12 +193,12 @@ def _nonlinear(
                 _refuse_unsymmetric(found_adjoint @ probe, pulled @ answer)
         return found_adjoint
 
-    there, controls, residual = solution.inputs, found.controls, None
+    there, load_parameters, residual = solution.inputs, found.load_parameters, None
     if loose:
         with there.in_core():
-            residual = model.gradient(found.state, controls)
+            residual = model.gradient(found.state, load_parameters)
     return FinerSolution(
-        scene, finer, places, there, found.state, controls, factorizations, residual, adjoint
+        scene, finer, places, there, found.state, load_parameters, factorizations, residual, adjoint
     )
 
 
@@ -216,13 +216,13 @@ def _found(
     options.max_relaxation_steps = 0
     options.max_factorizations = _MOST_FROM_COARSE
     try:
-        near = solve(inputs, start, [], inputs.controls, inputs.controls, options)
+        near = solve(inputs, start, [], inputs.load_parameters, inputs.load_parameters, options)
         return near, near.equilibrium.factorizations
     except NotConverged as failed:
         spent = _MOST_FROM_COARSE if failed.last_good is None else failed.last_good.factorizations
         if not result.stable:
             raise
-    from_rest = find(scene, load_parameters(result), None, search, store_factor=store_factor)
+    from_rest = find(scene, load_keywords(result), None, search, store_factor=store_factor)
     return from_rest, spent + from_rest.equilibrium.factorizations
 
 

@@ -17,7 +17,7 @@ from ...mesh.finer import bisected
 from ...model.scene.finer_scene import finer_scene, refuse_what_stays
 from ..linear.response import LinearResponse, linear_response
 from ..statics.equilibrium import Equilibrium
-from .enriched import equilibrium_on, load_parameters, positions_of
+from .enriched import equilibrium_on, load_keywords, positions_of
 from .error_estimate import ErrorEstimate, check_result, error_estimate, planes_of
 from .output_value import Output, PositionsOfResult
 
@@ -156,7 +156,7 @@ def _on_finer(
     if made.n_dofs > max_unknowns:
         raise _missed(f"the next mesh needs {made.n_dofs}, more than max_unknowns, {max_unknowns}", refined)
     if isinstance(result, LinearResponse):
-        return linear_response(made, **load_parameters(result))
+        return linear_response(made, **load_keywords(result))
     try:
         return equilibrium_on(result, made, tuple(finer))
     except NotConverged as failed:

@@ -99,7 +99,7 @@ class CriticalAdjoint:
                 rates = self._rates(system, leaf, fraction, change)
                 forces, held = forces + rates[0], held + rates[1]
                 by_values = Gradient(
-                    self._inputs.scene, system.bent.by_values, fraction * system.bent.by_controls
+                    self._inputs.scene, system.bent.by_values, fraction * system.bent.by_load_parameters
                 )
                 bent += float(np.sum(by_leaf(self._inputs, leaf, by_values) * change))
             bent += float(system.bent.by_state @ held)
@@ -162,7 +162,7 @@ class CriticalAdjoint:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the rate of g of the free unknowns along a change of a leaf, and the motion of what supports prescribe."""
         inputs, model = self._inputs, self._inputs.scene._model
-        now = system.residual.controls
+        now = system.residual.load_parameters
         if leaf.owner is not None and leaf.name == REST:
             raise NoGradient(
                 f"no gradient by {REST} of a bifurcation, and no tangent of a path: only limit points have gradients by them"
@@ -172,7 +172,7 @@ class CriticalAdjoint:
             numbers, after = changed(inputs, leaf, step * change)
             model.set_values(numbers)
             return forces_and_prescribed(
-                model, system.residual.state, now + fraction * (after - inputs.controls)
+                model, system.residual.state, now + fraction * (after - inputs.load_parameters)
             )
 
         try:
@@ -191,8 +191,8 @@ _DISSOLVES = (
 
 def _scaled(inputs: Inputs, gradient: Gradient, fraction: float) -> Gradient:
     """Return a gradient with the fraction of the load parameters there that an input at one end of the path has."""
-    by_controls = fraction * gradient.of_controls(slice(None))
-    return Gradient(inputs.scene, gradient.of_values, by_controls, rest=gradient.rest)
+    by_load_parameters = fraction * gradient.of_load_parameters(slice(None))
+    return Gradient(inputs.scene, gradient.of_values, by_load_parameters, rest=gradient.rest)
 
 
 def _of_limit(system: CriticalSystem, by_parameter: float, by_state: np.ndarray) -> Slopes:
@@ -250,5 +250,5 @@ def _with_state(system: CriticalSystem, by_state: np.ndarray, multiplier: np.nda
     return Slopes(
         found.by_state + by_state,
         found.by_values + bend * system.bent.by_values,
-        found.by_controls + bend * system.bent.by_controls,
+        found.by_load_parameters + bend * system.bent.by_load_parameters,
     )

@@ -77,8 +77,8 @@ class CriticalSystem:
         """The rate dg/ds of the free unknowns along the path, and the motion of all unknowns that supports prescribe."""
 
         def at(step: float) -> np.ndarray:
-            controls = self.line.at(self.parameter + step)
-            return forces_and_prescribed(self._model, self.residual.state, controls)
+            load_parameters = self.line.at(self.parameter + step)
+            return forces_and_prescribed(self._model, self.residual.state, load_parameters)
 
         return self.completed(directional_derivative(at, [_STEP * each for each in _SHORTER]))
 
@@ -100,7 +100,7 @@ class CriticalSystem:
     def bent_by_parameter(self) -> float:
         """The derivative of v . K v by the path parameter, at fixed free unknowns."""
         rate = self.line.after - self.line.before
-        return float(self.bent.by_controls @ rate + self.bent.by_state @ self.rates[1])
+        return float(self.bent.by_load_parameters @ rate + self.bent.by_state @ self.rates[1])
 
     def alignment(self, forces: np.ndarray) -> float:
         """Return the cosine between the mode and forces, 0 if these vanish."""
@@ -141,8 +141,8 @@ class Located:
 
     def system(self) -> CriticalSystem:
         """Return the system there; the core must hold the values."""
-        controls = self.line.at(self.parameter)
-        residual = Residual(self.inputs, self.state, self._angle_branches, controls)
+        load_parameters = self.line.at(self.parameter)
+        residual = Residual(self.inputs, self.state, self._angle_branches, load_parameters)
         return CriticalSystem(residual, self.line, self.parameter, self._mode)
 
     def _improve(self) -> None:
@@ -191,6 +191,6 @@ class Located:
         return float(change), model.expand(motion) + change * held
 
 
-def forces_and_prescribed(model: _core.Model, state: np.ndarray, controls: np.ndarray) -> np.ndarray:
+def forces_and_prescribed(model: _core.Model, state: np.ndarray, load_parameters: np.ndarray) -> np.ndarray:
     """Return g and the increments to what supports prescribe, both of all unknowns, (2, n)."""
-    return np.stack([model.gradient(state, controls), model.driven_increment(state, controls)])
+    return np.stack([model.gradient(state, load_parameters), model.driven_increment(state, load_parameters)])

@@ -59,17 +59,17 @@ def curvature(
     nothing = np.zeros(model.size)
     with inputs.in_core():
         Residual(
-            inputs, found.state, found.turns, inputs.controls
+            inputs, found.state, found.turns, inputs.load_parameters
         ).hessian()  # refuses one that is not symmetric
         multiplier = _core.push_forward(model, found, weights, nothing)
 
     def at(step: float, multiplier: np.ndarray, weights: np.ndarray) -> list[np.ndarray]:
         there = moved_inputs(inputs, [step * each for each in along])
         with there.in_core():
-            residual = Residual(there, found.state + step * motion, found.turns, there.controls)
+            residual = Residual(there, found.state + step * motion, found.turns, there.load_parameters)
             slopes = residual.slopes(multiplier)
             through = residual.prescribed(slopes.by_state + weights)
-        gradient = Gradient(scene, slopes.by_values + through[0], slopes.by_controls + through[1])
+        gradient = Gradient(scene, slopes.by_values + through[0], slopes.by_load_parameters + through[1])
         return [slopes.by_state, *(by_leaf(there, leaf, gradient).ravel() for leaf in inputs.leaves)]
 
     parts = at(0.0, multiplier, weights)
@@ -103,7 +103,7 @@ def rows_of(parts: list[np.ndarray]) -> np.ndarray:
 def moved_inputs(inputs: Inputs, changes: list[np.ndarray]) -> Inputs:
     """Return the inputs after changes of all leaves. Raises ValueError beyond the range of a value."""
     scene, replaced = inputs.scene, {owner: dict(named) for owner, named in inputs.values.replaced.items()}
-    magnetization, controls = inputs.magnetization, inputs.controls
+    magnetization, load_parameters = inputs.magnetization, inputs.load_parameters
     for leaf, change in zip(inputs.leaves, changes, strict=True):
         if leaf.owner is not None:
             before = np.asarray(replaced[leaf.owner][leaf.name], dtype=np.float64)
@@ -111,15 +111,17 @@ def moved_inputs(inputs: Inputs, changes: list[np.ndarray]) -> Inputs:
         elif leaf.name == "remanent_magnetization":
             magnetization = magnetization + np.broadcast_to(change, magnetization.shape)
         else:
-            layout, key = scene._control_layout, ("scene", leaf.name)
-            controls = layout.packed({key: layout.of(controls, *key)[0] + change}, controls)
+            layout, key = scene._load_parameter_layout, ("scene", leaf.name)
+            load_parameters = layout.packed(
+                {key: layout.of(load_parameters, *key)[0] + change}, load_parameters
+            )
     there = copy.copy(inputs)
     there.values = (
         Values(scene, replaced, magnetization, sampling_of=inputs.values)
         if replaced or magnetization is not None
         else inputs.values
     )
-    there.controls = controls
+    there.load_parameters = load_parameters
     return there
 
 

@@ -53,7 +53,7 @@ class MotionAdjoint:
             (by_vertices, by_directions), prescribed = rest
             rest = (by_vertices + found_by["positions"], by_directions), prescribed
         gradient = Gradient(
-            inputs.scene, found_by.pop("values"), found_by.pop("controls"), found_by, rest=rest
+            inputs.scene, found_by.pop("values"), found_by.pop("load_parameters"), found_by, rest=rest
         )
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if is_wanted else None for leaf, is_wanted in leaves]

@@ -86,23 +86,23 @@ class EnergyAdjoint:
         inputs.leaves = leaves
         return EnergyAdjoint(self._function, inputs, self._base)
 
-    def state(self, controls: np.ndarray) -> np.ndarray:
+    def state(self, load_parameters: np.ndarray) -> np.ndarray:
         """Return all unknowns. Positions do not determine the directions that clamps hold: the clamps prescribe these."""
         scene, state = self.inputs.scene, self._base.copy()
         first = 3 * scene._bodies.n_points
         directions = slice(first, first + 3 * len(scene._constraints.directions))
-        state[directions] += self._model.driven_increment(state, controls)[directions]
+        state[directions] += self._model.driven_increment(state, load_parameters)[directions]
         return state
 
-    def of_terms(self, controls: np.ndarray | None = None) -> list[tuple[str, float]]:
+    def of_terms(self, load_parameters: np.ndarray | None = None) -> list[tuple[str, float]]:
         """Return the energies of the terms in the core, which must hold the values."""
-        controls = self.inputs.controls if controls is None else controls
-        return self._model.term_energies(self.state(controls), [], controls)
+        load_parameters = self.inputs.load_parameters if load_parameters is None else load_parameters
+        return self._model.term_energies(self.state(load_parameters), [], load_parameters)
 
-    def by_name(self, controls: np.ndarray | None = None) -> dict[str, float]:
+    def by_name(self, load_parameters: np.ndarray | None = None) -> dict[str, float]:
         """Return the energies, {name: J}, those of one name summed; the core must hold the values."""
         found: dict[str, float] = {}
-        for name, energy in self.of_terms(controls):
+        for name, energy in self.of_terms(load_parameters):
             found[name] = found.get(name, 0.0) + energy
         return found
 
@@ -110,10 +110,10 @@ class EnergyAdjoint:
     def unknowns(self) -> Unknowns:
         return Unknowns(self._function, self.inputs.scene)
 
-    def _gradient(self, controls: np.ndarray) -> np.ndarray:
-        state = self.state(controls)
-        self._model.term_energies(state, [], controls)  # sets the turns of angles to those at rest
-        return self._model.gradient(state, controls)
+    def _gradient(self, load_parameters: np.ndarray) -> np.ndarray:
+        state = self.state(load_parameters)
+        self._model.term_energies(state, [], load_parameters)  # sets the turns of angles to those at rest
+        return self._model.gradient(state, load_parameters)
 
     @property
     def count(self) -> int:
@@ -121,33 +121,35 @@ class EnergyAdjoint:
         with self.inputs.in_core():
             return len(self.by_name())
 
-    def weighted(self, weights: np.ndarray, state: np.ndarray, controls: np.ndarray) -> np.ndarray:
+    def weighted(self, weights: np.ndarray, state: np.ndarray, load_parameters: np.ndarray) -> np.ndarray:
         """Return the gradient of the weighted sum of `by_name` by all unknowns of the core, which must hold the values."""
-        names = self._names(state, controls)
+        names = self._names(state, load_parameters)
         if np.ptp(weights) == 0.0:
-            return weights[0] * self._model.gradient(state, controls)
+            return weights[0] * self._model.gradient(state, load_parameters)
         each = zip(weights, names, strict=True)
         return sum(
-            weight * self._model.term_gradient(name, state, controls) for weight, name in each if weight
+            weight * self._model.term_gradient(name, state, load_parameters)
+            for weight, name in each
+            if weight
         )
 
-    def _names(self, state: np.ndarray, controls: np.ndarray) -> list[str]:
+    def _names(self, state: np.ndarray, load_parameters: np.ndarray) -> list[str]:
         """Return the names of `by_name`, and set the turns of angles to those at rest."""
-        return [*dict.fromkeys(name for name, _ in self._model.term_energies(state, [], controls))]
+        return [*dict.fromkeys(name for name, _ in self._model.term_energies(state, [], load_parameters))]
 
     @cached_property
     def gradient(self) -> np.ndarray:
         """The gradient of the sum by all unknowns of the core."""
         with self.inputs.in_core():
-            return self._gradient(self.inputs.controls)
+            return self._gradient(self.inputs.load_parameters)
 
     @cached_property
     def hessian(self) -> scipy.sparse.csr_array:
         """The Hessian of the sum by all unknowns of the core, whole."""
-        state, controls = self.state(self.inputs.controls), self.inputs.controls
+        state, load_parameters = self.state(self.inputs.load_parameters), self.inputs.load_parameters
         with self.inputs.in_core():
-            self._model.term_energies(state, [], controls)
-            size, starts, rows, values = self._model.hessian(state, controls, reduced=False)
+            self._model.term_energies(state, [], load_parameters)
+            size, starts, rows, values = self._model.hessian(state, load_parameters, reduced=False)
             columns, stiffnesses = self._model.low_rank(reduced=False)
         lower = scipy.sparse.csc_array((values, rows, starts), shape=(size, size))
         whole = lower + lower.T - scipy.sparse.diags_array(lower.diagonal())
@@ -182,9 +184,9 @@ class EnergyAdjoint:
         """Return the gradient of the weighted sum by positions (n_v, 3) and by edge rotations (n_e,)."""
         if np.ptp(weights) == 0.0:
             return tuple(weights[0] * each for each in self.by_unknowns)
-        controls, unknowns = self.inputs.controls, self.unknowns
+        load_parameters, unknowns = self.inputs.load_parameters, self.unknowns
         with self.inputs.in_core():
-            return unknowns.split(self.weighted(weights, self.state(controls), controls))
+            return unknowns.split(self.weighted(weights, self.state(load_parameters), load_parameters))
 
     def mixed(
         self,
@@ -222,20 +224,22 @@ class EnergyAdjoint:
 
     def _works(self, motion: np.ndarray) -> np.ndarray:
         """Return the products of a motion with the gradients of single energies, (n,)."""
-        state, controls = self.state(self.inputs.controls), self.inputs.controls
+        state, load_parameters = self.state(self.inputs.load_parameters), self.inputs.load_parameters
         with self.inputs.in_core():
-            names = self._names(state, controls)
-            return np.array([motion @ self._model.term_gradient(name, state, controls) for name in names])
+            names = self._names(state, load_parameters)
+            return np.array(
+                [motion @ self._model.term_gradient(name, state, load_parameters) for name in names]
+            )
 
     def _bent(self, weights: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Return the rate of the gradient of the weighted sum along a motion. Raises NoGradient where it is not smooth."""
-        state, controls = self.state(self.inputs.controls), self.inputs.controls
+        state, load_parameters = self.state(self.inputs.load_parameters), self.inputs.load_parameters
         length = self._relative_size(motion)
         if length == 0.0:
             return np.zeros_like(motion)
         with self.inputs.in_core():
             rate = directional_derivative(
-                lambda step: self.weighted(weights, state + step * motion, controls)[None],
+                lambda step: self.weighted(weights, state + step * motion, load_parameters)[None],
                 [_STEP * shorter / length for shorter in _SHORTER],
             )
         if rate is None:
@@ -258,18 +262,18 @@ class EnergyAdjoint:
         return any(leaf.owner is each for each in scene.supports) or bool(self._moved_by(leaf, False))
 
     def _by_values(self, motion: np.ndarray) -> Gradient:
-        inputs, state = self.inputs, self.state(self.inputs.controls)
+        inputs, state = self.inputs, self.state(self.inputs.load_parameters)
         with inputs.in_core():
-            self._model.term_energies(state, [], inputs.controls)
-            by_values = _core.vjp(self._model, state, inputs.controls, motion)[0]
-        return Gradient(inputs.scene, by_values, np.zeros_like(inputs.controls))
+            self._model.term_energies(state, [], inputs.load_parameters)
+            by_values = _core.vjp(self._model, state, inputs.load_parameters, motion)[0]
+        return Gradient(inputs.scene, by_values, np.zeros_like(inputs.load_parameters))
 
     def _moved_by(self, leaf: Leaf, of_values: bool) -> list[tuple[str, str]]:
         """Return those values of the core, or those load parameters, that depend on a leaf."""
         scene = self.inputs.scene
-        layout = scene._value_layout if of_values else scene._control_layout
+        layout = scene._value_layout if of_values else scene._load_parameter_layout
         mixed = np.random.default_rng(0).uniform(0.5, 1.5, layout.size)
-        zeros = scene._value_layout.zeros(), scene._control_layout.zeros()
+        zeros = scene._value_layout.zeros(), scene._load_parameter_layout.zeros()
         found = []
         for key in layout:
             probe = layout.packed({key: layout.of(mixed, *key)}, layout.zeros())
@@ -283,10 +287,10 @@ class EnergyAdjoint:
         if np.prod(leaf.shape, dtype=int) != 1:
             return False
         scene = self.inputs.scene
-        layout = scene._value_layout if of_values else scene._control_layout
+        layout = scene._value_layout if of_values else scene._load_parameter_layout
         mixed = np.random.default_rng(1).uniform(0.5, 1.5, layout.size)
         of_key = layout.of(mixed, *key)
-        zeros = scene._value_layout.zeros(), scene._control_layout.zeros()
+        zeros = scene._value_layout.zeros(), scene._load_parameter_layout.zeros()
         probe = layout.packed({key: of_key}, layout.zeros())
         both = (probe, zeros[1]) if of_values else (zeros[0], probe)
         found = by_leaf(self.inputs, leaf, Gradient(scene, *both))
@@ -298,15 +302,15 @@ class EnergyAdjoint:
         It is found by differences of the values and load parameters that depend on the leaf, one after another.
         """
         inputs, scene = self.inputs, self.inputs.scene
-        by_values, by_controls = scene._value_layout.zeros(), scene._control_layout.zeros()
-        numbers, controls = inputs.values.numbers, inputs.controls
+        by_values, by_load_parameters = scene._value_layout.zeros(), scene._load_parameter_layout.zeros()
+        numbers, load_parameters = inputs.values.numbers, inputs.load_parameters
         with inputs.in_core():
             try:
                 for key in self._moved_by(leaf, True):
 
                     def with_values(changed):
                         self._model.set_values(changed)
-                        return function(controls)
+                        return function(load_parameters)
 
                     entries = scene._value_layout.of(np.arange(numbers.size), *key).ravel()
                     _by_entries(
@@ -315,11 +319,16 @@ class EnergyAdjoint:
             finally:
                 self._model.set_values(numbers)
             for key in self._moved_by(leaf, False):
-                entries = scene._control_layout.of(np.arange(controls.size), *key).ravel()
+                entries = scene._load_parameter_layout.of(np.arange(load_parameters.size), *key).ravel()
                 _by_entries(
-                    function, controls, entries, by_controls, leaf.name, self._is_one(leaf, key, False)
+                    function,
+                    load_parameters,
+                    entries,
+                    by_load_parameters,
+                    leaf.name,
+                    self._is_one(leaf, key, False),
                 )
-        return by_leaf(inputs, leaf, Gradient(scene, by_values, by_controls))
+        return by_leaf(inputs, leaf, Gradient(scene, by_values, by_load_parameters))
 
 
 def _by_entries(

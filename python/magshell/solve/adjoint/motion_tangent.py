@@ -123,7 +123,7 @@ class _Direction:
         elif leaf.owner is not None or leaf.name == "remanent_magnetization":
             self._add_value(leaf, change)
         elif leaf.name in self._asked._load_parameters:
-            layout = self._inputs.scene._control_layout
+            layout = self._inputs.scene._load_parameter_layout
             columns = layout.of(np.arange(layout.size), "scene", leaf.name).ravel()
             self._rows[:, columns] += change.reshape(len(self._rows), -1)
         else:
@@ -137,7 +137,7 @@ class _Direction:
             "values": self._values,
             "values_at": None if self._reshapes or self._is_linear() else self._values_at,
             "model_at": self._model_at if self._reshapes else None,
-            "controls": self._rows,
+            "load_parameters": self._rows,
             "state": self._state,
             "velocity": self._velocity,
             "mass": self._mass,
@@ -282,7 +282,7 @@ class _Direction:
         layout, numbers = scene._value_layout, self._inputs.values.numbers
         for key in layout:
             yield _largest(layout.of(numbers, *key)), _largest(layout.of(self._values, *key))
-        layout, entries = scene._control_layout, np.arange(columns)
+        layout, entries = scene._load_parameter_layout, np.arange(columns)
         groups = [layout.of(entries, *key).ravel() for key in layout]
         groups += [entries[part] for parts in self._asked._scheduled._slices.values() for part in parts]
         for group in groups:

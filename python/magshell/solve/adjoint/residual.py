@@ -39,7 +39,7 @@ class Slopes(NamedTuple):
 
     by_state: np.ndarray
     by_values: np.ndarray
-    by_controls: np.ndarray
+    by_load_parameters: np.ndarray
     by_rest: np.ndarray = np.zeros(0)
 
     def plus(self, factor: float, other: Slopes) -> Slopes:
@@ -69,23 +69,27 @@ class Residual:
     """
 
     def __init__(
-        self, inputs: Inputs, state: np.ndarray, angle_branches: list[list[float]], controls: np.ndarray
+        self,
+        inputs: Inputs,
+        state: np.ndarray,
+        angle_branches: list[list[float]],
+        load_parameters: np.ndarray,
     ):
         self.inputs: Inputs = inputs
         self.state: np.ndarray = state
-        self.controls: np.ndarray = controls
+        self.load_parameters: np.ndarray = load_parameters
         self.angle_branches: list[list[float]] = angle_branches
         self._model = inputs.scene._model
         self.with_rest: bool = any(leaf.name == REST and leaf.owner is not None for leaf in inputs.leaves)
 
-    def at(self, state: np.ndarray, controls: np.ndarray) -> Residual:
+    def at(self, state: np.ndarray, load_parameters: np.ndarray) -> Residual:
         """Return the same at another state and other load parameters."""
-        return Residual(self.inputs, state, self.angle_branches, controls)
+        return Residual(self.inputs, state, self.angle_branches, load_parameters)
 
     def gradient(self) -> np.ndarray:
         """Return g of all unknowns."""
         self._prepare()
-        return self._model.gradient(self.state, self.controls)
+        return self._model.gradient(self.state, self.load_parameters)
 
     def hessian(self) -> tuple[tuple[int, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, ...]]:
         """Return the lower triangle of H for the free unknowns, and its low-rank part, () if there is none.
@@ -94,7 +98,7 @@ class Residual:
         """
         self._prepare()
         try:
-            triangle = self._model.hessian(self.state, self.controls)
+            triangle = self._model.hessian(self.state, self.load_parameters)
         except ValueError as error:
             raise NoGradient(f"no gradient here: {error}") from error
         columns, stiffnesses = self._model.low_rank()
@@ -108,7 +112,7 @@ class Residual:
     def slopes_at_fixed_state(self, motion: np.ndarray) -> Slopes:
         """Return the derivatives of motion . g without those by unknowns, for which H need not be symmetric."""
         self._prepare()
-        by_inputs = _core.vjp(self._model, self.state, self.controls, motion, self.with_rest)
+        by_inputs = _core.vjp(self._model, self.state, self.load_parameters, motion, self.with_rest)
         return Slopes(np.zeros_like(self.state), *by_inputs)
 
     def slopes(self, motion: np.ndarray) -> Slopes:
@@ -135,7 +139,7 @@ class Residual:
         """
 
         def at(step: float) -> Slopes:
-            there = self.at(self.state + step * along, self.controls + step * rate)
+            there = self.at(self.state + step * along, self.load_parameters + step * rate)
             return there.bent(motion, motion)
 
         self._prepare()
@@ -169,7 +173,7 @@ class Residual:
 
     def prescribed(self, by_state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return derivatives by values and load parameters through what supports prescribe, from those by unknowns."""
-        return _core.prescribed_vjp(self._model, self.state, self.controls, by_state)
+        return _core.prescribed_vjp(self._model, self.state, self.load_parameters, by_state)
 
     def by_inputs(self, slopes: Slopes, masses: np.ndarray | None = None) -> Gradient:
         """Return the gradient by values and load parameters, also through what supports prescribe.
@@ -183,25 +187,25 @@ class Residual:
             model = self._model
             held = slopes.by_state - model.expand(model.reduce(slopes.by_state))
             rest = [_core.at_nodes(model, each) for each in (slopes.by_rest, held)]
-        by_values, by_controls = slopes.by_values + through[0], slopes.by_controls + through[1]
-        return Gradient(self.inputs.scene, by_values, by_controls, others, rest=rest)
+        by_values, by_load_parameters = slopes.by_values + through[0], slopes.by_load_parameters + through[1]
+        return Gradient(self.inputs.scene, by_values, by_load_parameters, others, rest=rest)
 
     def _slopes(self, state: np.ndarray, motion: np.ndarray) -> Slopes:
         return Slopes(
             self._product(state, motion),
-            *_core.vjp(self._model, state, self.controls, motion, self.with_rest),
+            *_core.vjp(self._model, state, self.load_parameters, motion, self.with_rest),
         )
 
     def _product(self, state: np.ndarray, motion: np.ndarray) -> np.ndarray:
         try:
-            return self._model.hessian_product(state, self.controls, motion)
+            return self._model.hessian_product(state, self.load_parameters, motion)
         except ValueError as error:
             raise NoGradient(f"no gradient here: {error}") from error
 
     def _prepare(self) -> None:
         if self.inputs.scene.rigid_parts:
             raise NoGradient("no gradient here: the scene has rigid bodies or skeletons")
-        self._model.term_energies(self.state, self.angle_branches, self.controls)
+        self._model.term_energies(self.state, self.angle_branches, self.load_parameters)
 
     @property
     def _parts(self) -> list[slice]:
@@ -210,7 +214,7 @@ class Residual:
         vertices = 3 * scene._bodies.n_points
         directions = vertices + 3 * len(scene._constraints.directions)
         parts, first = [slice(0, vertices), slice(vertices, directions), slice(directions, n)], n
-        for layout in (scene._value_layout, scene._control_layout):
+        for layout in (scene._value_layout, scene._load_parameter_layout):
             entries = np.arange(first, first + layout.size)
             for key in layout:
                 of_key = layout.of(entries, *key).ravel()
@@ -229,7 +233,7 @@ class Residual:
             lengths = state[: 3 * (scene._bodies.n_points + len(scene._constraints.directions))]
         else:
             lengths = np.zeros(0)
-        flat = np.abs(np.concatenate([state, values.numbers, self.controls, lengths]))
+        flat = np.abs(np.concatenate([state, values.numbers, self.load_parameters, lengths]))
         sizes = np.array([flat[part].max() for part in parts])
         return np.where(np.isfinite(sizes), sizes, 0.0)
 

@@ -50,7 +50,7 @@ class _Load(NamedTuple):
     before: float
     after: float
 
-    def controls(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    def load_parameters(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Return the load parameters before c + after c1."""
         return self.before * before + self.after * after
 
@@ -84,7 +84,7 @@ class ResponseAdjoint:
         self._solve, self._leaves, self._at_rest = solve, leaves, at_rest
         self._loads = _QUADRATIC if quadratic else _LINEAR
         self._model = inputs.scene._model
-        layout = inputs.scene._control_layout
+        layout = inputs.scene._load_parameter_layout
         of_supports = layout.of(np.arange(layout.size), "scene", "support_factor")
         self._support_factor = int(np.ravel(of_supports)[0])
 
@@ -147,12 +147,15 @@ class ResponseAdjoint:
     @property
     def _rate(self) -> np.ndarray:
         """The rate dx/ds of all unknowns, by the factor of supports."""
-        return self._model.prescribed_rate(self._here.controls)
+        return self._model.prescribed_rate(self._here.load_parameters)
 
     @property
     def _further(self) -> float:
         """The change s1 - s of the factor of supports."""
-        return float(self._after.controls[self._support_factor] - self._here.controls[self._support_factor])
+        return float(
+            self._after.load_parameters[self._support_factor]
+            - self._here.load_parameters[self._support_factor]
+        )
 
     def _solved(self, forces: np.ndarray) -> np.ndarray:
         """Return the solution of K x = forces (n,) of the free unknowns, zero for the others, of all unknowns."""
@@ -172,54 +175,58 @@ class ResponseAdjoint:
 
     def _gradient(self, weights: np.ndarray) -> tuple[Gradient, Gradient]:
         """Return the gradients of y . u by the inputs of K, and by those of the response."""
-        here, after = self._here, self._after.controls
+        here, after = self._here, self._after.load_parameters
         fixed = self._at_rest and not here.with_rest
         multiplier = self._solved(self._model.reduce(weights))
         total, by_after = here.bent(multiplier, self._response).times(-1.0), np.zeros_like(after)
         for load in self._loads:
-            there = here.at(here.state, load.controls(here.controls, after))
+            there = here.at(here.state, load.load_parameters(here.load_parameters, after))
             slopes = there.slopes_at_fixed_state(multiplier) if fixed else there.slopes(multiplier)
-            by_after = by_after + load.weight * load.after * slopes.by_controls
-            total = total.plus(load.weight, slopes._replace(by_controls=load.before * slopes.by_controls))
+            by_after = by_after + load.weight * load.after * slopes.by_load_parameters
+            total = total.plus(
+                load.weight, slopes._replace(by_load_parameters=load.before * slopes.by_load_parameters)
+            )
         by_values, before, further = self._by_motion(weights - here.product(multiplier))
-        total = total._replace(by_values=total.by_values + by_values, by_controls=total.by_controls + before)
+        total = total._replace(
+            by_values=total.by_values + by_values, by_load_parameters=total.by_load_parameters + before
+        )
         if self._at_rest:
             total = total.with_state_at_rest()
         else:
             total = total.plus(1.0, here.slopes(self._solved(-self._model.reduce(total.by_state))))
-        of_after = total.at_fixed_state()._replace(by_controls=by_after + further)
+        of_after = total.at_fixed_state()._replace(by_load_parameters=by_after + further)
         return here.by_inputs(total), here.by_inputs(of_after)
 
     def _by_motion(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the derivatives of forces . m by all values, by c and by c1."""
         here, entry, further = self._here, self._support_factor, self._further
         power = float(forces @ self._rate)
-        at_once = np.zeros_like(here.controls)
+        at_once = np.zeros_like(here.load_parameters)
         at_once[entry] = power
         if further == 0.0:
             return np.zeros_like(here.inputs.values.numbers), -at_once, at_once
 
         def at(step: float) -> np.ndarray:
-            controls = here.controls.copy()
-            controls[entry] += step
-            return rows_of([*here.at(here.state, controls).prescribed(forces)])
+            load_parameters = here.load_parameters.copy()
+            load_parameters[entry] += step
+            return rows_of([*here.at(here.state, load_parameters).prescribed(forces)])
 
         found = directional_derivative(at, list(_STEPS))
         if found is None:
             raise NoGradient("no derivative of this response: supports do not move smoothly")
-        by_values, by_controls = found
-        values, controls = here.inputs.values.numbers.size, here.controls.size
-        return further * by_values[:values], further * by_controls[:controls] - at_once, at_once
+        by_values, by_load_parameters = found
+        values, load_parameters = here.inputs.values.numbers.size, here.load_parameters.size
+        return further * by_values[:values], further * by_load_parameters[:load_parameters] - at_once, at_once
 
     def _tangent(self, changes: list[tuple[Leaf, int, np.ndarray]]) -> np.ndarray:
         """Return du along changes of leaves."""
-        here, after, reduce = self._here, self._after.controls, self._model.reduce
+        here, after, reduce = self._here, self._after.load_parameters, self._model.reduce
         forces, motion, gradient, increment = np.sum([self._rates(*each) for each in changes], axis=0)
         if np.any(gradient) or np.any(increment):
             moved = increment - self._solved(reduce(gradient + here.product(increment)))
             forces = forces - here.bent(self._response, moved).by_state
             for load in self._loads:
-                there = here.at(here.state, load.controls(here.controls, after))
+                there = here.at(here.state, load.load_parameters(here.load_parameters, after))
                 forces = forces + load.weight * there.product(moved)
         return motion + self._solved(reduce(forces - here.product(motion)))
 
@@ -252,23 +259,27 @@ class ResponseAdjoint:
         here, model = self._here, self._model
 
         def at(step: float) -> np.ndarray:
-            numbers, controls = changed(inputs, leaf, step * change)
+            numbers, load_parameters = changed(inputs, leaf, step * change)
             model.set_values(numbers)
-            before, after = (controls, self._after.controls) if part == BEFORE else (here.controls, controls)
+            before, after = (
+                (load_parameters, self._after.load_parameters)
+                if part == BEFORE
+                else (here.load_parameters, load_parameters)
+            )
             return self._rows(model, here.state, before, after)
 
         return at
 
     def _rows_by_rest(self, leaf: Leaf, change: np.ndarray) -> Callable[[float], np.ndarray]:
-        here, after = self._here, self._after.controls
+        here, after = self._here, self._after.load_parameters
 
         def at(step: float) -> np.ndarray:
             values = values_in_neighbour(here.inputs, leaf, step * change)
             with values.in_core():
                 model = values.scene._model
                 state = model.rest_state() if self._at_rest else here.state
-                model.term_energies(state, here.angle_branches, here.controls)
-                return self._rows(model, state, here.controls, after)
+                model.term_energies(state, here.angle_branches, here.load_parameters)
+                return self._rows(model, state, here.load_parameters, after)
 
         return at
 
@@ -278,7 +289,7 @@ class ResponseAdjoint:
         """Return f - K u, m, g(q, c) and what supports prescribe in a model, (4, n)."""
         forces = -model.hessian_product(state, before, self._response)
         for load in self._loads:
-            forces += load.weight * model.gradient(state, load.controls(before, after))
+            forces += load.weight * model.gradient(state, load.load_parameters(before, after))
         further = after[self._support_factor] - before[self._support_factor]
         found = [forces, further * model.prescribed_rate(before)]
         if self._at_rest:

@@ -36,10 +36,10 @@ class Adjoint:
                 for leaf, asked in zip(inputs.leaves, wanted, strict=True)
             ]
         with inputs.in_core():
-            by_values, by_controls, *rest = _core.pull_back(
+            by_values, by_load_parameters, *rest = _core.pull_back(
                 model, self._found, *by_outputs, requires_rest(inputs, wanted)
             )
-        gradient = Gradient(inputs.scene, by_values, by_controls, rest=rest or None)
+        gradient = Gradient(inputs.scene, by_values, by_load_parameters, rest=rest or None)
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if asked else None for leaf, asked in leaves]
 
@@ -50,7 +50,7 @@ class Adjoint:
         """
         self._refuse()
         inputs, found, model = self._inputs, self._found, self._inputs.scene._model
-        n_driven = len(model.driving(found.state, found.controls, found.turns))
+        n_driven = len(model.driving(found.state, found.load_parameters, found.turns))
         if not any(np.any(each) for each in along):
             change = np.zeros(model.size)
         else:

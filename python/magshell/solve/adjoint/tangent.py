@@ -40,7 +40,7 @@ def state_tangent(inputs: Inputs, found: _core.StaticsResult, along: list[np.nda
     total = np.zeros((4, model.size))  # of the gradient, of what is prescribed, and of what joints carry
     with inputs.in_core():
         try:
-            model.term_energies(found.state, found.turns, inputs.controls)  # sets the turns of angles
+            model.term_energies(found.state, found.turns, inputs.load_parameters)  # sets the turns of angles
             for leaf, change in zip(inputs.leaves, along, strict=True):
                 if np.any(change):
                     rates = _rates(inputs, found, leaf, change)
@@ -58,7 +58,7 @@ def motor_tangent(
 ) -> np.ndarray:
     """Return the derivative of the forces of motors along changes of all leaves, with which all dofs change so."""
     model, state, turns = inputs.scene._model, found.state, found.turns
-    total = np.zeros(len(model.driving(state, found.controls, turns)))
+    total = np.zeros(len(model.driving(state, found.load_parameters, turns)))
     size = float(np.abs(change).max(initial=0.0))
     with inputs.in_core():
         try:
@@ -66,7 +66,8 @@ def motor_tangent(
                 steps = [_STEP * inputs.scene._bodies.extent * factor / size for factor in _SHORTER]
                 total += _required(
                     directional_derivative(
-                        lambda t: model.driving(state + t * change, inputs.controls, turns)[None], steps
+                        lambda t: model.driving(state + t * change, inputs.load_parameters, turns)[None],
+                        steps,
                     )
                 )[0]
             for leaf, each in zip(inputs.leaves, along, strict=True):
@@ -74,9 +75,9 @@ def motor_tangent(
                     continue
 
                 def at(step: float, leaf=leaf, each=each) -> np.ndarray:
-                    numbers, controls = changed(inputs, leaf, step * each)
+                    numbers, load_parameters = changed(inputs, leaf, step * each)
                     model.set_values(numbers)
-                    return model.driving(state, controls, turns)[None]
+                    return model.driving(state, load_parameters, turns)[None]
 
                 total += _required(directional_derivative(at, steps_along(inputs, leaf, each)))[0]
         finally:
@@ -94,10 +95,10 @@ def changed(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> tuple[np.ndarray,
     """Return the numbers of all values and the load parameters after the change of a leaf. Raises ValueError beyond its
     range."""
     if leaf.owner is None and leaf.name != "remanent_magnetization":
-        layout, key = inputs.scene._control_layout, ("scene", leaf.name)
-        now = _added(layout.of(inputs.controls, *key)[0], change)
-        return inputs.values.numbers, layout.packed({key: now}, inputs.controls)
-    return changed_values(inputs, leaf, change).numbers, inputs.controls
+        layout, key = inputs.scene._load_parameter_layout, ("scene", leaf.name)
+        now = _added(layout.of(inputs.load_parameters, *key)[0], change)
+        return inputs.values.numbers, layout.packed({key: now}, inputs.load_parameters)
+    return changed_values(inputs, leaf, change).numbers, inputs.load_parameters
 
 
 def changed_values(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> Values:
@@ -124,31 +125,33 @@ def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.nd
     """
     if leaf.refusal:
         raise NoGradient(f"no tangent by {leaf.name}: {leaf.refusal}")
-    model, state, controls = inputs.scene._model, found.state, inputs.controls
+    model, state, load_parameters = inputs.scene._model, found.state, inputs.load_parameters
     if leaf.name == REST and leaf.owner is not None:
 
         def at(step: float) -> np.ndarray:
             values = values_in_neighbour(inputs, leaf, step * change)
             with values.in_core():
                 there = values.scene._model
-                there.term_energies(state, found.turns, controls)
-                return np.stack([there.gradient(state, controls), there.driven_increment(state, controls)])
+                there.term_energies(state, found.turns, load_parameters)
+                return np.stack(
+                    [there.gradient(state, load_parameters), there.driven_increment(state, load_parameters)]
+                )
 
         rates = directional_derivative(at, steps_by_rest(leaf, change))
         return rates if rates is not None else _refuse_kink(leaf)
     moves = isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry
-    gradient = model.gradient(state, controls) if moves else np.zeros(0)
+    gradient = model.gradient(state, load_parameters) if moves else np.zeros(0)
     # The gradient on the free unknowns and the increments of motors vanish by cancellation: of all forces, and of places.
     forces_and_places = np.abs(gradient).max(initial=0.0), np.abs(state).max(initial=0.0)
     sizes = np.array([1.0 / each if each > 0.0 else 0.0 for each in forces_and_places])[[0, 1, 1, 0]]
 
     def at(step: float) -> np.ndarray:
-        numbers, controls = changed(inputs, leaf, step * change)
+        numbers, load_parameters = changed(inputs, leaf, step * change)
         model.set_values(numbers)
-        forces = model.gradient(state, controls)
+        forces = model.gradient(state, load_parameters)
         if not moves:
-            return np.stack([forces, model.driven_increment(state, controls)])
-        moved, driven, free = _core.state_on_joints(model, state, controls, gradient)
+            return np.stack([forces, model.driven_increment(state, load_parameters)])
+        moved, driven, free = _core.state_on_joints(model, state, load_parameters, gradient)
         return np.stack([forces, driven, moved, np.pad(free, (0, len(state) - len(free)))])
 
     rates = directional_derivative(at, steps_along(inputs, leaf, change), sizes=sizes if moves else None)
@@ -186,7 +189,7 @@ def steps_along(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> list[float]:
     elif leaf.name == "remanent_magnetization":
         value = inputs.magnetization
     else:
-        value = inputs.scene._control_layout.of(inputs.controls, "scene", leaf.name)
+        value = inputs.scene._load_parameter_layout.of(inputs.load_parameters, "scene", leaf.name)
     size, length = np.abs(np.asarray(value)).max(initial=0.0), np.abs(change).max()
     if size == 0.0:
         return [_STEP_AT_ZERO * factor / length for factor in _FROM_ZERO]

@@ -1,4 +1,4 @@
-"""Motions of many designs or controls of one scene at once, over threads: ms.simulate(..., batch=k)."""
+"""Motions of many designs or load parameters of one scene at once, over threads: ms.simulate(..., batch=k)."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ class MotionInputs:
             for name, value in arguments.items()
             if name in SOLVE_KEYWORDS and SOLVE_KEYWORDS[name].varies
         }
-        self._load_parameters = {name: self._controls(each) for name, each in self._schedules.items()}
+        self._load_parameters = {name: self._of_keyword(each) for name, each in self._schedules.items()}
         self._scheduled = ScheduledValues(self, list(schedules))
         self.interrupted: bool = False
         if fine_faces_of is not None:
@@ -120,7 +120,7 @@ class MotionInputs:
                 self.interrupted = True
         if self._outside is not None:
             check_outside(inputs.scene, inputs.values, self._outside, 0.0)
-        self._rows = self._all_controls()
+        self._rows = self._all_load_parameters()
         self.core: _core.MotionInput = _core.MotionInput(
             inputs.scene._model,
             {
@@ -137,7 +137,7 @@ class MotionInputs:
                 "time_steps": [] if chooses else self.time_steps.lengths,
                 "recorded": [0] if chooses else self.time_steps.grid_ends[:: self.record_every],
                 "adaptive": self._ladder(adaptive) if chooses else None,
-                "controls": self._rows,
+                "load_parameters": self._rows,
                 "varying": self._scheduled.entries,
                 "newton": solver._newton_options(),
                 "projective": getattr(integrator, "_projective", None),
@@ -168,8 +168,8 @@ class MotionInputs:
         moving = {each: rows for each, rows in scheduled.items() if isinstance(each[0], AppliedField)}
         factors = np.abs(np.asarray(detached(self._load_parameters["field_factor"]), dtype=np.float64))
         strongest = int(np.argmax(factors))
-        layout = inputs.scene._control_layout
-        controls = layout.packed(
+        layout = inputs.scene._load_parameter_layout
+        load_parameters = layout.packed(
             {
                 ("scene", name): np.asarray(detached(rows), dtype=np.float64)[strongest]
                 for name, rows in self._load_parameters.items()
@@ -185,7 +185,9 @@ class MotionInputs:
                 numbers = np.asarray(detached(rows), dtype=np.float64)[k]
                 now[owner] = now.get(owner, inputs.values.current(owner)).replaced(**{name: numbers})
             there = inputs.with_values(inputs.values.with_objects(now)) if now else inputs
-            inputs = keeping_fine_faces(inputs, with_fine_faces(there, self.start.state, controls).values)
+            inputs = keeping_fine_faces(
+                inputs, with_fine_faces(there, self.start.state, load_parameters).values
+            )
         return inputs
 
     def _ladder(self, adaptive: Adaptive) -> dict[str, Any]:
@@ -196,10 +198,10 @@ class MotionInputs:
             "intervals": self.steps,
             "deepest": adaptive._deepest,
             "record_every": self.record_every,
-            "controls": self._controls_of_step,
+            "load_parameters": self._load_parameters_of_step,
         }
 
-    def _controls_of_step(self, interval: int, begin: float, end: float) -> np.ndarray:
+    def _load_parameters_of_step(self, interval: int, begin: float, end: float) -> np.ndarray:
         """Return all load parameters at the time points of a step, from one fraction of an interval to another."""
         points = TimePoints(self.time_steps.part(interval, begin, end), self.integrator._times)
         numbers = {
@@ -209,7 +211,7 @@ class MotionInputs:
         rows, poses = self._scheduled.at(points)
         return self._in_layout(numbers, {**self._poses(points.times), **poses}, rows)
 
-    def _all_controls(self) -> np.ndarray:
+    def _all_load_parameters(self) -> np.ndarray:
         """Return all load parameters at all time points in the core's layout, (time points, m)."""
         moving = self._poses(self.time_points.times)
         if moving and (time_step := self.time_steps.tensor) is not None:
@@ -225,7 +227,7 @@ class MotionInputs:
         rows |= {(f"obstacle {k}", "pose"): array for k, array in poses.items()}
         if self.inputs.scene.own_field is not None:
             rows["scene", "own_field_factor"] = np.ones(len(further))
-        layout = self.inputs.scene._control_layout
+        layout = self.inputs.scene._load_parameter_layout
         return np.concatenate([layout.rows(rows, len(further)), further], axis=1)
 
     def _poses(self, times: np.ndarray) -> dict[int, np.ndarray]:
@@ -240,7 +242,7 @@ class MotionInputs:
             value = np.zeros(3)
         return Schedule(self.inputs.scene, name, unit, row, value)
 
-    def _controls(self, schedule: Schedule) -> np.ndarray:
+    def _of_keyword(self, schedule: Schedule) -> np.ndarray:
         numbers = self.at_time_points(schedule)
         if schedule.name == "applied_flux_density":
             warn_of_field(self.inputs.scene, np.asarray(detached(numbers)))
@@ -390,12 +392,12 @@ def _check_memory(steps: int, record_every: int, times_per_step: int, unknowns: 
 
     times_per_step: time points of a step at which load parameters are needed; unknowns: degrees of freedom.
     """
-    controls = _BYTES_PER_TIME_POINT * times_per_step * steps
+    load_parameters = _BYTES_PER_TIME_POINT * times_per_step * steps
     states = 32 * unknowns * (steps // record_every)  # positions and velocities, in the core and handed out
-    if (there := _physical_memory()) is not None and controls + states > there:
+    if (there := _physical_memory()) is not None and load_parameters + states > there:
         raise MemoryError(
-            f"{steps:,} steps need {controls / 1e9:.3g} GB for their controls and {states / 1e9:.3g} GB for the "
-            f"recorded states, and this computer has {there / 1e9:.3g} GB: record fewer (record_every), or take the "
+            f"{steps:,} steps need {load_parameters / 1e9:.3g} GB for their load parameters and {states / 1e9:.3g} GB for "
+            f"the recorded states, and this computer has {there / 1e9:.3g} GB: record fewer (record_every), or take the "
             "motion in parts, each with start= the one before"
         )
 

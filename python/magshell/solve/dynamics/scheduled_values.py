@@ -80,7 +80,7 @@ class ScheduledValues:
                 raise ValueError(
                     "a support that stays cannot be moved by a solve: give it a displacement in the scene, zero will do"
                 )
-        end = self._asked.inputs.scene._control_layout.size
+        end = self._asked.inputs.scene._load_parameter_layout.size
         end += sum(part.stop - part.start for slices in self._slices.values() for part in slices)
         slices = self._slices[id(owner), schedule.name] = []
         for label in labels:
@@ -96,7 +96,7 @@ class ScheduledValues:
                 path = ObstaclePath(self._asked, obstacle, its_own)
                 self._paths[k] = path
                 self.poses[k] = self._asked.inputs.take(
-                    "center", path.poses, _Pose(self._asked.inputs.scene._control_layout, k)
+                    "center", path.poses, _Pose(self._asked.inputs.scene._load_parameter_layout, k)
                 )
                 values.move(obstacle, path)
 
@@ -108,7 +108,7 @@ class _Values:
         self._slices, self._key = scheduled._slices, (id(schedule.owner), schedule.name)
 
     def by_time_points(self, gradient: Any) -> np.ndarray:
-        return sum(gradient.of_controls(part) for part in self._slices[self._key])
+        return sum(gradient.of_load_parameters(part) for part in self._slices[self._key])
 
     def columns(self) -> list[np.ndarray]:
         """Return the columns of the core's load parameters that have these numbers, once for each slice."""
@@ -122,7 +122,7 @@ class _Pose:
         self._layout, self._number = layout, number
 
     def by_time_points(self, gradient: Any) -> np.ndarray:
-        return gradient.control(f"obstacle {self._number}", "pose")
+        return gradient.load_parameter(f"obstacle {self._number}", "pose")
 
     def columns(self) -> list[np.ndarray]:
         """Return the columns of the core's load parameters that have these poses."""

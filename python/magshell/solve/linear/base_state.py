@@ -97,9 +97,11 @@ def leaves_of(inputs: Inputs, equilibrium: Equilibrium | None) -> list[tuple[Lea
 def residual_of(inputs: Inputs, equilibrium: Equilibrium | None) -> Residual:
     """Return the gradient of the energy at the rest shape without loads, or at an equilibrium with its own inputs."""
     if equilibrium is None:
-        return Residual(inputs, inputs.scene._model.rest_state(), [], inputs.scene._control_layout.zeros())
+        return Residual(
+            inputs, inputs.scene._model.rest_state(), [], inputs.scene._load_parameter_layout.zeros()
+        )
     about = inputs if equilibrium._inputs is None else equilibrium._inputs
-    return Residual(about, equilibrium._state, equilibrium._angle_branches, equilibrium._controls)
+    return Residual(about, equilibrium._state, equilibrium._angle_branches, equilibrium._load_parameters)
 
 
 def set_state(equilibrium: Equilibrium) -> None:
@@ -108,7 +110,7 @@ def set_state(equilibrium: Equilibrium) -> None:
     The state itself has angles up to full turns only.
     """
     model = equilibrium.scene._model
-    model.held_forces(equilibrium._state, equilibrium._angle_branches, equilibrium._controls)
+    model.held_forces(equilibrium._state, equilibrium._angle_branches, equilibrium._load_parameters)
 
 
 class StiffnessAbout(Stiffness):
@@ -120,19 +122,21 @@ class StiffnessAbout(Stiffness):
     def __init__(self, equilibrium: Equilibrium):
         set_state(equilibrium)
         model = equilibrium.scene._model
-        super().__init__(model, equilibrium._state, equilibrium._controls, "at the equilibrium")
+        super().__init__(model, equilibrium._state, equilibrium._load_parameters, "at the equilibrium")
 
     def response(self, inputs: Inputs) -> np.ndarray:
         """Return du of all degrees of freedom for load parameters that change from c to c1: K du = g(c) - g(c1) - K dm."""
-        model, layout = self._model, inputs.scene._control_layout
-        further = inputs.controls - self.controls
-        moved = model.prescribed_rate(self.controls) * layout.of(further, "scene", "support_factor")
+        model, layout = self._model, inputs.scene._load_parameter_layout
+        further = inputs.load_parameters - self.load_parameters
+        moved = model.prescribed_rate(self.load_parameters) * layout.of(further, "scene", "support_factor")
         if (
             inputs.scene.has_susceptible_shells
         ):  # forces are quadratic in the field: a central difference is exact
-            ahead, behind = (model.gradient(self.state, self.controls + way * further) for way in (1.0, -1.0))
+            ahead, behind = (
+                model.gradient(self.state, self.load_parameters + way * further) for way in (1.0, -1.0)
+            )
             return self.answer(0.5 * (behind - ahead), moved)
-        forces = self.gradient - model.gradient(self.state, inputs.controls)
+        forces = self.gradient - model.gradient(self.state, inputs.load_parameters)
         return self.answer(forces, moved)
 
 
@@ -142,7 +146,7 @@ def refuse_what_cannot_be(equilibrium: Equilibrium, inputs: Inputs) -> None:
         raise ValueError(
             "the equilibrium is not stable, so that nothing stays near it: linear theory needs one that is"
         )
-    if np.array_equal(inputs.controls, equilibrium._controls):
+    if np.array_equal(inputs.load_parameters, equilibrium._load_parameters):
         raise ValueError(
             "the load parameters are those of the equilibrium, so that nothing changes: give the load_factor, "
             "applied_flux_density, ... towards which they go, as to ms.follow_path"

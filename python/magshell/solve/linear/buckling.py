@@ -193,18 +193,18 @@ def _differentiable(
         return like(kept, *given)
     from ..adjoint.autograd import solved
 
-    layout = inputs.scene._control_layout
+    layout = inputs.scene._load_parameter_layout
     here = residual_of(inputs, equilibrium)
     with inputs.in_core():
-        rate = model.prescribed_rate(here.controls)
-    further = layout.of(inputs.controls - here.controls, "scene", "support_factor")
+        rate = model.prescribed_rate(here.load_parameters)
+    further = layout.of(inputs.load_parameters - here.load_parameters, "scene", "support_factor")
     refusal = ""
     if inputs.scene.has_susceptible_shells:
         refusal = "no gradient of buckling factors with a susceptibility"
     moves = rate.any() and (further.any() or any(leaf.name == "support_factor" for leaf, _ in leaves))
     adjoint = BucklingAdjoint(
         here,
-        inputs.controls,
+        inputs.load_parameters,
         response,
         factors,
         np.stack([model.expand(each) for each in vectors.T], axis=1),
@@ -227,13 +227,15 @@ def _refuse_odd_loads(scene: Scene, stiffness: Stiffness, inputs: Inputs) -> Non
     """Raise ValueError unless forces and stiffness at rest are the same for reversed load parameters: those of a field on
     susceptible shells are, to the last bit, and others are not.
     """
-    model, state, controls = scene._model, stiffness.state, inputs.controls
-    moved = model.prescribed_rate(stiffness.controls).any()
-    same_forces = np.array_equal(model.gradient(state, controls), model.gradient(state, -controls))
+    model, state, load_parameters = scene._model, stiffness.state, inputs.load_parameters
+    moved = model.prescribed_rate(stiffness.load_parameters).any()
+    same_forces = np.array_equal(
+        model.gradient(state, load_parameters), model.gradient(state, -load_parameters)
+    )
     if (
         moved
         or not same_forces
-        or not np.array_equal(*(model.hessian(state, c)[3] for c in (controls, -controls)))
+        or not np.array_equal(*(model.hessian(state, c)[3] for c in (load_parameters, -load_parameters)))
     ):
         raise ValueError(
             "the forces on a susceptible shell are quadratic in the field, and something else loads the scene (a remanent "
@@ -260,9 +262,11 @@ def _stiffness_change(
     moves = displacement > _ROUND_OFF * length
     step = _PRE_LOAD * length / displacement if moves else 1.0
 
-    def values(t: float, of_controls: float) -> np.ndarray:
-        controls = (1.0 - of_controls) * stiffness.controls + of_controls * inputs.controls
-        return scene._model.hessian(stiffness.state + t * response, controls)[3]
+    def values(t: float, of_load_parameters: float) -> np.ndarray:
+        load_parameters = (
+            1.0 - of_load_parameters
+        ) * stiffness.load_parameters + of_load_parameters * inputs.load_parameters
+        return scene._model.hessian(stiffness.state + t * response, load_parameters)[3]
 
     if quadratic:
         change = (values(step, 0.0) - values(-step, 0.0)) / (2.0 * step) + values(0.0, 1.0) - values(0.0, 0.0)

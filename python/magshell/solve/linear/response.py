@@ -43,7 +43,7 @@ class LinearResponse(PlotMixin):
     wall_time: float
     equilibrium: Equilibrium | None = None
     _values: Any = field(repr=False, default=None)
-    _controls: Any = field(repr=False, default=None)
+    _load_parameters: Any = field(repr=False, default=None)
     _rest: Any = field(repr=False, default=None)  # (n_v, 3) m, the rest positions, if a tensor was given
 
     def __getstate__(self) -> dict[Any, Any]:
@@ -142,7 +142,7 @@ def linear_response(
         wall_time=time.perf_counter() - began,
         equilibrium=equilibrium,
         _values=inputs.values,
-        _controls=inputs.controls,
+        _load_parameters=inputs.load_parameters,
         _rest=inputs.given_rest,
     )
 

@@ -27,7 +27,9 @@ class RestStiffness(Stiffness):
         scene = inputs.scene
         refuse_springs(inputs)
         refuse_what_acts(inputs)
-        super().__init__(scene._model, scene._model.rest_state(), scene._control_layout.zeros(), "at rest")
+        super().__init__(
+            scene._model, scene._model.rest_state(), scene._load_parameter_layout.zeros(), "at rest"
+        )
 
     def response(self, inputs: Inputs, at_rest: np.ndarray | None = None) -> np.ndarray:
         """Return du of all degrees of freedom: K du = g(0) - g(c) - K dm, with dm the motion of supports and motors.
@@ -37,15 +39,19 @@ class RestStiffness(Stiffness):
 
         at_rest: g(0) from `forces_at_rest`; by default with the forces of joints, which are no load then.
         """
-        model, layout = self._model, inputs.scene._control_layout
+        model, layout = self._model, inputs.scene._load_parameter_layout
         if not self.factorized:
-            found = model.small_deflection(self.state, self.controls, inputs.controls, at_rest)
+            found = model.small_deflection(self.state, self.load_parameters, inputs.load_parameters, at_rest)
             if not len(motion := found.motion):
                 refuse_indefinite(found.report, found.unknowns, self._where)
             return motion
-        moved = model.prescribed_rate(self.controls) * layout.of(inputs.controls, "scene", "support_factor")
-        moved = moved + model.driven_increment(self.state, self.controls)
-        forces = (self.gradient if at_rest is None else at_rest) - model.gradient(self.state, inputs.controls)
+        moved = model.prescribed_rate(self.load_parameters) * layout.of(
+            inputs.load_parameters, "scene", "support_factor"
+        )
+        moved = moved + model.driven_increment(self.state, self.load_parameters)
+        forces = (self.gradient if at_rest is None else at_rest) - model.gradient(
+            self.state, inputs.load_parameters
+        )
         return self.answer(forces, moved)
 
 
@@ -75,7 +81,7 @@ def forces_at_rest(inputs: Inputs) -> np.ndarray | None:
         return None
     scene = inputs.scene
     with inputs.values.with_objects(pulling).in_core():
-        return scene._model.gradient(scene._model.rest_state(), scene._control_layout.zeros())
+        return scene._model.gradient(scene._model.rest_state(), scene._load_parameter_layout.zeros())
 
 
 def refuse_what_acts(inputs: Inputs) -> None:
@@ -119,9 +125,13 @@ def _refuse_custom_forces(inputs: Inputs) -> None:
             own["springs"] = each
     if not own:
         return
-    model, state, controls = scene._model, scene._model.rest_state(), scene._control_layout.zeros()
-    forces = [np.abs(model.term_gradient(name, state, controls)).max() for name in own]
-    _, _, _, stiffness = model.hessian(state, controls, reduced=False)
+    model, state, load_parameters = (
+        scene._model,
+        scene._model.rest_state(),
+        scene._load_parameter_layout.zeros(),
+    )
+    forces = [np.abs(model.term_gradient(name, state, load_parameters)).max() for name in own]
+    _, _, _, stiffness = model.hessian(state, load_parameters, reduced=False)
     size = max(scene._bodies.extent, np.abs(state).max())
     for each, force in zip(own.values(), forces, strict=True):
         if force > _ROUND_OFF * np.abs(stiffness).max() * size:

@@ -49,10 +49,10 @@ class Stiffness:
     where: the state in words, for that error.
     """
 
-    def __init__(self, model: _core.Model, state: np.ndarray, controls: np.ndarray, where: str):
+    def __init__(self, model: _core.Model, state: np.ndarray, load_parameters: np.ndarray, where: str):
         self._model, self._where = model, where
         self.state: np.ndarray = state
-        self.controls: np.ndarray = controls
+        self.load_parameters: np.ndarray = load_parameters
         self._whole: _Factorized | None = None
 
     @property
@@ -63,14 +63,14 @@ class Stiffness:
     @functools.cached_property
     def _assembled(self) -> tuple[tuple[int, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, ...]]:
         """The lower triangle and the low-rank part, both from one evaluation."""
-        triangle = self._model.hessian(self.state, self.controls)
+        triangle = self._model.hessian(self.state, self.load_parameters)
         columns, stiffnesses = self._model.low_rank()
         return triangle, ((columns, stiffnesses) if np.any(stiffnesses) else ())
 
     @functools.cached_property
     def gradient(self) -> np.ndarray:
         """The gradient of the energy by all degrees of freedom."""
-        return self._model.gradient(self.state, self.controls)
+        return self._model.gradient(self.state, self.load_parameters)
 
     @property
     def matrix(self) -> scipy.sparse.csc_array:
@@ -111,7 +111,7 @@ class Stiffness:
 
     def _pull(self, moved: np.ndarray) -> np.ndarray:
         """Return K times a motion of all degrees of freedom."""
-        pattern = self._model.hessian(self.state, self.controls, reduced=False)
+        pattern = self._model.hessian(self.state, self.load_parameters, reduced=False)
         return symmetric(*pattern) @ moved + times_low_rank(self._model.low_rank(reduced=False), moved)
 
 

@@ -204,10 +204,10 @@ def vibration_modes(
     with inputs.in_core():
         if equilibrium is None:
             refuse_what_acts(inputs)
-            stiffness = model.hessian(model.rest_state(), scene._control_layout.zeros())
+            stiffness = model.hessian(model.rest_state(), scene._load_parameter_layout.zeros())
         else:
             set_state(equilibrium)
-            stiffness = model.hessian(equilibrium._state, equilibrium._controls)
+            stiffness = model.hessian(equilibrium._state, equilibrium._load_parameters)
         low_rank = model.low_rank()
         inertia = None
         if scene.rigid_parts:
@@ -251,11 +251,11 @@ def _differentiable(
         return like(kept, *inputs.given)
     from ..adjoint.autograd import solved
 
-    model, layout = inputs.scene._model, inputs.scene._control_layout
+    model, layout = inputs.scene._model, inputs.scene._load_parameter_layout
     normed = vectors / np.sqrt((masses[:, None] * vectors**2).sum(axis=0))
     at = (model.rest_state(), [], layout.zeros())
     if equilibrium is not None:
-        at = (equilibrium._state, equilibrium._angle_branches, equilibrium._controls)
+        at = (equilibrium._state, equilibrium._angle_branches, equilibrium._load_parameters)
     adjoint = FrequencyAdjoint(
         Residual(inputs, *at),
         squares,

@@ -90,7 +90,7 @@ def moving_obstacles(
     scene: Scene, along: AlongPath | None, before: np.ndarray, after: np.ndarray
 ) -> tuple[Obstacle, ...]:
     """Return the obstacles that move between two sets of load parameters, and with `along`; all if supports move."""
-    factors = [scene._control_layout.of(each, "scene", "support_factor") for each in (before, after)]
+    factors = [scene._load_parameter_layout.of(each, "scene", "support_factor") for each in (before, after)]
     moves = [np.any(move.rotation) or np.any(move.translation) for move in scene._constraints.moves]
     if any(moves) and not np.array_equal(*factors):
         return scene.obstacles

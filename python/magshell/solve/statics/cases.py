@@ -8,7 +8,7 @@ from numbers import Number
 from typing import Any
 
 from ..._input.quantity import shape_of
-from ..._runtime.keywords import CONTROLS, FLUX_DENSITY
+from ..._runtime.keywords import FLUX_DENSITY, LOAD_PARAMETERS
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ...errors import DesignRejected, Interrupted, NotConverged
 from ...model.scene.scene import Scene
@@ -16,7 +16,7 @@ from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, find
 
-_DIMENSIONS = {name: len(SOLVE_KEYWORDS[name].shapes[0]) for name in CONTROLS}  # of one case
+_DIMENSIONS = {name: len(SOLVE_KEYWORDS[name].shapes[0]) for name in LOAD_PARAMETERS}  # of one case
 
 
 def _check_shape(name: str, shape: tuple[int, ...]) -> None:

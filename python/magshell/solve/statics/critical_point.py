@@ -82,7 +82,7 @@ def _leaves_of_load(start: Equilibrium | None) -> list[Any]:
     """Return those leaves of an equilibrium that are load parameters."""
     if start is None or start._inputs is None:
         return []
-    own = start.scene._control_layout
+    own = start.scene._load_parameter_layout
     return [leaf for leaf in start._inputs.leaves if leaf.owner is None and ("scene", leaf.name) in own]
 
 
@@ -93,7 +93,9 @@ def _connected(
     kind, at = found.kind.name, found.point
     parameter, state, refusal, point = at.parameter, at.state, _refusal(inputs, moving, kind), None
     if not refusal:
-        point = Located(inputs, Line(before, inputs.controls), kind, state, at.turns, parameter, found.mode)
+        point = Located(
+            inputs, Line(before, inputs.load_parameters), kind, state, at.turns, parameter, found.mode
+        )
         parameter, state, refusal = point.parameter, point.state, point.problem
     arrays = np.array(parameter), np.ascontiguousarray(inputs.scene._model.positions(state))
     given = [*inputs.given, *(leaf.tensor for leaf in of_start)]

@@ -64,9 +64,9 @@ def _seen(inputs, found) -> list[str]:
     """Describe the last state of a search that took too many factorizations."""
     scene, failed = inputs.scene, found.failed
     state = failed.state if failed.state.size else found.state
-    controls = failed.controls if failed.state.size else found.controls
+    load_parameters = failed.load_parameters if failed.state.size else found.load_parameters
     with inputs.in_core():
-        energy = sum(energy for _, energy in scene._model.term_energies(state, found.turns, controls))
+        energy = sum(energy for _, energy in scene._model.term_energies(state, found.turns, load_parameters))
     moved = np.linalg.norm(scene._model.positions(state) - scene.mesh.rest_positions, axis=1).max(initial=0.0)
     return [
         f"Then the energy was {energy:.3g} J, and the largest displacement {moved:.3g} m, "
@@ -99,7 +99,7 @@ def _unbalanced_vertices(inputs, found) -> tuple[list[str], np.ndarray]:
         return [], np.zeros(0, dtype=int)
     model, failed = inputs.scene._model, found.failed
     with inputs.in_core():
-        gradient = model.gradient(failed.state, failed.controls)
+        gradient = model.gradient(failed.state, failed.load_parameters)
     told, near = [], []
     for vector, text in (
         (model.expand(model.reduce(gradient)), "The forces are out of balance most"),

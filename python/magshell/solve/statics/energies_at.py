@@ -343,10 +343,10 @@ def _point(function: str, scene: Scene, positions, edge_rotations, arguments: di
         rotations = quantity("edge_rotations", "rad", rotations, (bodies.n_rotations,))
     with inputs.in_core():
         state = model.state(places, rotations)
-    inputs = with_fine_faces(inputs, state, inputs.controls)
+    inputs = with_fine_faces(inputs, state, inputs.load_parameters)
     with inputs.in_core():
         adjoint = EnergyAdjoint(function, inputs, state)
-        if reason := model.refusal(adjoint.state(inputs.controls)):
+        if reason := model.refusal(adjoint.state(inputs.load_parameters)):
             raise ValueError(f"there is no energy at these positions: {reason}")
     return _Point(adjoint, dtype_like(*inputs.given) if inputs.leaves else None)
 
@@ -380,7 +380,9 @@ def _of_elements(adjoint: EnergyAdjoint, of_solid: bool, number: int) -> dict[st
     inputs, found = adjoint.inputs, {}
     model = inputs.scene._model
     with inputs.in_core():
-        of_terms = _core.element_energies(model, adjoint.state(inputs.controls), inputs.controls)
+        of_terms = _core.element_energies(
+            model, adjoint.state(inputs.load_parameters), inputs.load_parameters
+        )
     for name, solid, whose, elements in of_terms:
         if solid == of_solid and whose == number:
             found[name] = found.get(name, 0.0) + elements

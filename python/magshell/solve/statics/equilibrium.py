@@ -81,7 +81,7 @@ class Equilibrium(SaveMixin, OfOneBody):
     factorization: str
     _state: np.ndarray = field(repr=False)
     _angle_branches: list[Any] = field(repr=False)
-    _controls: Any = field(repr=False)
+    _load_parameters: Any = field(repr=False)
     _values: Any = field(repr=False)
     _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
     _driving: Any = field(repr=False, default=None)  # (m,) N m or N, of motors in joints, in the core's order
@@ -115,7 +115,7 @@ class Equilibrium(SaveMixin, OfOneBody):
     @property
     def _load_factors(self) -> np.ndarray:
         """The load factor of the only state, ()."""
-        return self.scene._control_layout.of(self._controls, "scene", "load_factor")[0]
+        return self.scene._load_parameter_layout.of(self._load_parameters, "scene", "load_factor")[0]
 
     def _state_at(self, index: int) -> np.ndarray:
         return self._state
@@ -162,7 +162,7 @@ class Equilibrium(SaveMixin, OfOneBody):
         0.01962
         """
         with self._values.in_core():
-            held = self.scene._model.held_forces(self._state, self._angle_branches, self._controls)
+            held = self.scene._model.held_forces(self._state, self._angle_branches, self._load_parameters)
         return reaction_in(self.scene, support, self._state, held.reshape(-1, 3))
 
     def magnetic_force(self, body: Shell | Solid | RigidBody | AppliedField) -> np.ndarray:

@@ -36,9 +36,9 @@ def strain_of_loads(inputs: Inputs) -> float:
         return 0.0
     model, x = scene._model, scene.mesh.rest_positions
     arms = x - x.mean(axis=0)
-    rest, nothing = model.rest_state(), scene._control_layout.zeros()
+    rest, nothing = model.rest_state(), scene._load_parameter_layout.zeros()
     with inputs.in_core():
-        force = model.positions(model.gradient(rest, inputs.controls))
+        force = model.positions(model.gradient(rest, inputs.load_parameters))
         stretched = model.state(x + _STRETCH * arms, np.zeros(scene._bodies.n_rotations))
         energies = [_elastic_energy(model.term_energies(each, [], nothing)) for each in (stretched, rest)]
     stiffness = 2.0 * (energies[0] - energies[1]) / _STRETCH**2

@@ -90,12 +90,16 @@ class MagneticState(Frozen):
     def _uniform(self) -> np.ndarray:
         """The uniform applied flux density, (3,) T."""
         result = self.equilibrium
-        return result.scene._control_layout.of(result._controls, "scene", "applied_flux_density")[0]
+        return result.scene._load_parameter_layout.of(
+            result._load_parameters, "scene", "applied_flux_density"
+        )[0]
 
     @property
     def _field_factor(self) -> float:
         result = self.equilibrium
-        return float(result.scene._control_layout.of(result._controls, "scene", "field_factor")[0])
+        return float(
+            result.scene._load_parameter_layout.of(result._load_parameters, "scene", "field_factor")[0]
+        )
 
     def magnetic_force(self, body: Shell | Solid | RigidBody | AppliedField) -> np.ndarray:
         """Return the magnetic force on a body or on a magnet of the scene, (3,) N.
@@ -166,7 +170,9 @@ class MagneticState(Frozen):
         model, bodies = result.scene._model, result.scene._bodies
         rows = bodies.spans[bodies.number(body)].vertices
         with result._values.in_core():
-            gradient = sum(model.term_gradient(name, result._state, result._controls) for name in _TERMS)
+            gradient = sum(
+                model.term_gradient(name, result._state, result._load_parameters) for name in _TERMS
+            )
             of_vertices = model.positions(gradient)
         positions = np.asarray(detached(result.positions))[rows]
         return _Actions(positions, -of_vertices[rows], np.zeros(3), positions.mean(axis=0))
@@ -243,7 +249,7 @@ class MagneticState(Frozen):
         """
         result = self.equilibrium
         with result._values.in_core():
-            return result.scene._model.magnetic_moments(term, result._state, result._controls)
+            return result.scene._model.magnetic_moments(term, result._state, result._load_parameters)
 
     def __repr__(self) -> str:
         energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())

@@ -192,7 +192,7 @@ class _EquilibriumSearch:
         with self._inputs.in_core():
             try:
                 values, shapes, _ = _core.lowest_modes(
-                    self._scene._model, known._state, known._angle_branches, known._controls, _MODES
+                    self._scene._model, known._state, known._angle_branches, known._load_parameters, _MODES
                 )
             except KeyboardInterrupt as stopped:
                 raise Interrupted("interrupted while modes were looked for", known) from stopped
@@ -213,12 +213,18 @@ class _EquilibriumSearch:
         return options
 
     def _from(self, known: Equilibrium, push: np.ndarray, options) -> Equilibrium | None:
-        model, controls = self._scene._model, self._inputs.controls
+        model, load_parameters = self._scene._model, self._inputs.load_parameters
         with self._inputs.in_core():
             state = _core.moved(model, known._state, self._displacement() * push)
         try:
             found = solve(
-                self._inputs, state, known._angle_branches, controls, controls, options, self._progress()
+                self._inputs,
+                state,
+                known._angle_branches,
+                load_parameters,
+                load_parameters,
+                options,
+                self._progress(),
             )
         except NotConverged:
             self._failed += 1
@@ -256,7 +262,7 @@ def _again(inputs, found: Equilibrium, search: Search) -> Equilibrium:
         return found
     options = Search(search.solver, False, None, search.ignore_velocity_forces).options()
     again: Solution = solve(
-        inputs, found._state, found._angle_branches, inputs.controls, inputs.controls, options
+        inputs, found._state, found._angle_branches, inputs.load_parameters, inputs.load_parameters, options
     )
     return again.equilibrium
 

@@ -149,22 +149,29 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     def equilibrium(self, index: int) -> Equilibrium:
         """Return one of the points, stable or not, as an Equilibrium, from which another solve may start."""
         index = range(len(self))[index]
-        controls = self._controls[index]
+        load_parameters = self._load_parameters[index]
         options = MixedNewton()._options()
         options.require_stable = False
         point = self._points[index]
         inputs = self._inputs.with_values(self._moving.values(self.parameters[index])).without_tensors()
-        return solve(inputs, point.state, point.turns, controls, controls, options).equilibrium
+        return solve(inputs, point.state, point.turns, load_parameters, load_parameters, options).equilibrium
 
     def _solved_from(self, point: Any, parameter: float) -> Any:
         """Return the core's equilibrium at another parameter, searched from a point nearby; None if none is found."""
-        controls = (1.0 - parameter) * self._from + parameter * self._to
+        load_parameters = (1.0 - parameter) * self._from + parameter * self._to
         options = MixedNewton()._options()
         options.newton, options.require_stable, options.start_at_rest = self._options.newton, False, False
         inputs = self._inputs.with_values(self._moving.values(parameter)).without_tensors()
         with inputs.in_core():
             found = _core.find_equilibrium(
-                self.scene._model, point.state, point.turns, controls, controls, options, None, []
+                self.scene._model,
+                point.state,
+                point.turns,
+                load_parameters,
+                load_parameters,
+                options,
+                None,
+                [],
             )
         return found if found.outcome == _core.Outcome.converged else None
 
@@ -201,9 +208,9 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     def _driving(self) -> np.ndarray:
         """The torques and forces of motors in joints, (n, m) N m or N."""
         model, rows = self.scene._model, []
-        for k, (point, controls) in enumerate(zip(self._points, self._controls, strict=True)):
+        for k, (point, load_parameters) in enumerate(zip(self._points, self._load_parameters, strict=True)):
             with self._values_at(k).in_core():
-                rows.append(model.driving(point.state, controls, point.turns))
+                rows.append(model.driving(point.state, load_parameters, point.turns))
         return np.array(rows)
 
     def _at_points(self, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -216,7 +223,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
 
     @property
     def _load_factors(self) -> np.ndarray:
-        return self._control("load_factor")[:, 0]
+        return self._load_parameter("load_factor")[:, 0]
 
     def _values_at(self, index: int):
         return self._moving.values(self.parameters[index])
@@ -224,16 +231,16 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     @property
     def applied_flux_densities(self) -> np.ndarray:
         """The uniform field at each point, (n, 3) T."""
-        return self._control("applied_flux_density")[:, 0]
+        return self._load_parameter("applied_flux_density")[:, 0]
 
     @property
-    def _controls(self) -> np.ndarray:
+    def _load_parameters(self) -> np.ndarray:
         """The load parameters at each point, (n, m), interpolated linearly."""
         along = self.parameters[:, None]
         return (1.0 - along) * self._from + along * self._to
 
-    def _control(self, name: str) -> np.ndarray:
-        return self.scene._control_layout.of(self._controls, "scene", name)
+    def _load_parameter(self, name: str) -> np.ndarray:
+        return self.scene._load_parameter_layout.of(self._load_parameters, "scene", name)
 
     @property
     def stable(self) -> np.ndarray:
@@ -339,7 +346,7 @@ def follow_path(
     interrupted = False
     if start is None:  # an equilibrium would be none with other fine faces
         try:  # a field may be a function of the caller's, in which Ctrl-C can come
-            inputs = with_fine_faces(inputs, state, inputs.controls)
+            inputs = with_fine_faces(inputs, state, inputs.load_parameters)
         except KeyboardInterrupt:
             interrupted = True
     moving = AlongPath(inputs, start)
@@ -348,7 +355,7 @@ def follow_path(
     options.first_step, options.max_step = first_step, max_step
     options.min_parameter, options.max_points = max(min_parameter, -1e300), max_points
     options.locate_critical = locate_critical
-    options.watched = watched_obstacles(scene, moving_obstacles(scene, moving, from_, inputs.controls))
+    options.watched = watched_obstacles(scene, moving_obstacles(scene, moving, from_, inputs.load_parameters))
 
     return _follow(
         inputs, moving, (state, angle_branches, from_, start), options, until, progress, interrupted
@@ -385,13 +392,13 @@ def _follow(
             state,
             angle_branches,
             np.concatenate([from_, moving.before]),
-            np.concatenate([inputs.controls, moving.after]),
+            np.concatenate([inputs.load_parameters, moving.after]),
             options,
             moving.entries,
             until,
             stop_at_once if interrupted else _advance(bar),
         )
-        bending = _bending_energies(scene, found, inputs.controls)
+        bending = _bending_energies(scene, found, inputs.load_parameters)
     path = _path(inputs, moving, found, (from_, first), options, time.perf_counter() - began)
     log.debug("path: %s, %d points, %.3g s", found.outcome.name, len(path), path.wall_time)
     if found.outcome == _core.Outcome.interrupted:
@@ -426,17 +433,17 @@ def _warn_of_fields(path: EquilibriumPath) -> None:
         warn_of_sampling(
             path._values_at(k),
             path.positions[k],
-            float(path._control("field_factor")[k, 0]),
-            path._control("applied_flux_density")[k, 0],
+            float(path._load_parameter("field_factor")[k, 0]),
+            path._load_parameter("applied_flux_density")[k, 0],
             f"the path, at point {k}, parameter {path.parameters[k]:.4g}",
         )
 
 
-def _bending_energies(scene: Scene, found, controls) -> list[float]:
+def _bending_energies(scene: Scene, found, load_parameters) -> list[float]:
     """Return the bending energies of the points if the mesh has obtuse faces, to which they matter; else none."""
     if not scene._bodies.flat_sheets_alone or not scene._obtuse_faces.faces.size:
         return []
-    return [scene._model.energies(point.state, controls).get("bending", 0.0) for point in found.points]
+    return [scene._model.energies(point.state, load_parameters).get("bending", 0.0) for point in found.points]
 
 
 def _advance(bar):
@@ -472,7 +479,7 @@ def _path(inputs: Inputs, moving: AlongPath, found, begin, options, wall_time: f
         _inputs=inputs,
         _moving=moving,
         _from=from_,
-        _to=inputs.controls,
+        _to=inputs.load_parameters,
         _options=options,
         _start=start,
     )

@@ -113,7 +113,9 @@ def find(
     options.smallest_step /= max(filling, 1.0)
     with inputs.in_core():
         check_apart(scene, state)
-    return solve(inputs, state, angle_branches, from_, inputs.controls, options, search.progress, moving)
+    return solve(
+        inputs, state, angle_branches, from_, inputs.load_parameters, options, search.progress, moving
+    )
 
 
 def inputs_of(scene: Scene, arguments: dict[Any, Any], ignore_velocity_forces: bool = False) -> Inputs:
@@ -198,9 +200,9 @@ def solve(
     warn_if_large(
         result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
     )
-    layout = scene._control_layout
-    field_factor = float(layout.of(found.controls, "scene", "field_factor")[0])
-    flux_density = layout.of(found.controls, "scene", "applied_flux_density")[0]
+    layout = scene._load_parameter_layout
+    field_factor = float(layout.of(found.load_parameters, "scene", "field_factor")[0])
+    flux_density = layout.of(found.load_parameters, "scene", "applied_flux_density")[0]
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         if is_suspect(found.field_sampling_error):
             warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
@@ -223,7 +225,7 @@ def _with_fine_faces_at_end(
         if found.outcome != _core.Outcome.converged:
             break
         try:
-            finer = with_fine_faces(inputs, found.state, found.controls, found.field_sampling_error)
+            finer = with_fine_faces(inputs, found.state, found.load_parameters, found.field_sampling_error)
         except KeyboardInterrupt as stopped:
             return found, inputs, stopped
         if finer is inputs:
@@ -231,7 +233,14 @@ def _with_fine_faces_at_end(
         options.start_at_rest = False
         with finer.in_core():
             again = _core.find_equilibrium(
-                inputs.scene._model, found.state, found.turns, found.controls, to, options, progress, []
+                inputs.scene._model,
+                found.state,
+                found.turns,
+                found.load_parameters,
+                to,
+                options,
+                progress,
+                [],
             )
         again.add_effort_of(found)
         found, inputs = again, finer
@@ -241,7 +250,7 @@ def _with_fine_faces_at_end(
 def _energies(scene: Scene, found) -> dict[str, float] | None:
     """Return the energies by term; None if Ctrl-C came meanwhile in a field function of the caller."""
     try:
-        return scene._model.energies(found.state, found.controls)
+        return scene._model.energies(found.state, found.load_parameters)
     except KeyboardInterrupt:
         return None
 
@@ -285,7 +294,7 @@ def _result(
         factorization=found.factorization,
         _state=found.state,
         _angle_branches=found.turns,
-        _controls=found.controls,
+        _load_parameters=found.load_parameters,
         _values=inputs.values,
         _own_points=points[n_v:] if scene.rigid_parts else None,
         _driving=driving,
@@ -301,7 +310,7 @@ def arrays_of(scene: Scene, found: _core.StaticsResult) -> tuple[np.ndarray, ...
     return (
         np.ascontiguousarray(model.points(found.state)),
         model.edge_rotations(found.state),
-        model.driving(found.state, found.controls, found.turns) if driven else np.zeros(0),
+        model.driving(found.state, found.load_parameters, found.turns) if driven else np.zeros(0),
     )
 
 
@@ -317,5 +326,7 @@ def _outputs(inputs: Inputs, found: _core.StaticsResult, arrays: tuple[np.ndarra
 def _flux_density(inputs: Inputs, found):
     if found.load_fraction == 1.0 and is_tensor(inputs.given_flux_density):
         return inputs.given_flux_density
-    flux_density = inputs.scene._control_layout.of(found.controls, "scene", "applied_flux_density")
+    flux_density = inputs.scene._load_parameter_layout.of(
+        found.load_parameters, "scene", "applied_flux_density"
+    )
     return like(flux_density[0].copy(), *inputs.given)

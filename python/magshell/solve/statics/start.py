@@ -35,15 +35,20 @@ def starting_point(
     model = scene._model
     if start is None:
         check_outside(scene, inputs.values, scene.mesh.rest_positions, 0.0)
-        return model.rest_state(), [], scene._control_layout.zeros(), True
+        return model.rest_state(), [], scene._load_parameter_layout.zeros(), True
     if isinstance(start, Origin):
-        return start.state, start.angle_branches, start.inputs.controls, True
+        return start.state, start.angle_branches, start.inputs.load_parameters, True
     if isinstance(start, Equilibrium):
         if start.scene is not scene and start.scene._family is scene._family:
-            return state_in(scene, start), start._angle_branches, start._controls, False
+            return state_in(scene, start), start._angle_branches, start._load_parameters, False
         if start.scene is not scene:
             raise ValueError("start is an equilibrium of another scene; hand over its positions instead")
-        return start._state, start._angle_branches, start._controls, start._values.same_as(inputs.values)
+        return (
+            start._state,
+            start._angle_branches,
+            start._load_parameters,
+            start._values.same_as(inputs.values),
+        )
     positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
     n_v = scene.mesh.n_vertices
     if len(positions) != n_v:
@@ -54,7 +59,7 @@ def starting_point(
         state = model.state(positions, np.zeros(scene._bodies.n_rotations))
     check_outside(scene, inputs.values, model.points(state), 0.0)
     check_rigid(scene, positions, model.positions(state), "start [m]", scene.mesh.size)
-    return state, [], inputs.controls, False
+    return state, [], inputs.load_parameters, False
 
 
 def state_in(scene: Scene, start: Equilibrium) -> np.ndarray:

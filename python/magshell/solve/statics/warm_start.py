@@ -11,7 +11,7 @@ import numpy as np
 from ... import _core
 from ..._input.tensors import require_torch
 from ..._runtime.frozen import Frozen, remember
-from ..._runtime.keywords import CONTROLS, as_keywords
+from ..._runtime.keywords import LOAD_PARAMETERS, as_keywords
 from ...errors import EquilibriumJumped, Interrupted, NotConverged
 from ...model.scene.fine_faces import fine_faces, having_fine_faces
 from ...model.scene.reshaped import REST, reshaped
@@ -76,7 +76,7 @@ class WarmStart(Frozen):
 
     def __call__(self, **design: Any) -> Equilibrium | Any:
         """Find the equilibrium, or the equilibria, of a design, given by the arguments of ms.equilibrium."""
-        design = as_keywords(self.scene, design, CONTROLS)
+        design = as_keywords(self.scene, design, LOAD_PARAMETERS)
         cases = split(design)
         self._check(cases)
         starts = starts_of(self._start, len(cases or [design]))
@@ -176,7 +176,7 @@ class WarmStart(Frozen):
         model, before = there.inputs.scene._model, last.inputs.scene._model
         if model is before:
             with there.inputs.in_core():
-                expected = _core.first_order_change(model, last.found, there.inputs.controls)
+                expected = _core.first_order_change(model, last.found, there.inputs.load_parameters)
             expected = model.positions(expected)
         else:
             expected = _first_order_change(last, there)
@@ -203,8 +203,8 @@ def _first_order_change(last: Solution, there: Solution) -> np.ndarray:
         raise ValueError(f"{REST} must be given in every call of a WarmStart, or in none")
     state, model = state_in(ours, last.equilibrium), ours._model
     with there.inputs.in_core():
-        forces = renumbered_vector(theirs, ours, model.gradient(state, there.inputs.controls))
-        increment = model.driven_increment(state, there.inputs.controls)
+        forces = renumbered_vector(theirs, ours, model.gradient(state, there.inputs.load_parameters))
+        increment = model.driven_increment(state, there.inputs.load_parameters)
     moved = renumbered_vector(theirs, ours, increment)
     moved[held] = increment[held]
     with last.inputs.in_core():
