@@ -38,6 +38,6 @@ class Owner(Frozen):
         """Raise ValueError if a row of `rows` (n, ...) is not allowed for this parameter during a motion."""
 
     def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
-        """Return the gradients by the object's own parameters, from the core's gradient; one row for each of its
-        parts."""
+        """Return the gradients with respect to the object's own parameters, from the core's gradient; one row for each of
+        its parts."""
         return {name: gradient.value(label, name) for name in self._replaceable}

@@ -331,7 +331,9 @@ class PrintableSearch:
         return Trial(lambda: self.evaluate(torch.from_numpy(self.faces.magnetization)), []).objective
 
     def sample(self) -> tuple[float, np.ndarray]:
-        """Return the objective and its gradient by the magnetization over the strength in world axes, (n_f, 3)."""
+        """Return the objective and its gradient with respect to the magnetization over the strength in world axes, (n_f,
+        3).
+        """
         from .optim.sample import Trial
 
         torch = require_torch("minimize_printable")

@@ -1,4 +1,4 @@
-"""Steps of an environment in torch, with gradients by its state and its action."""
+"""Steps of an environment in torch, with gradients with respect to its state and its action."""
 
 from __future__ import annotations
 

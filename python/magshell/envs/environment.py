@@ -245,7 +245,8 @@ class Environment(gymnasium.Env):
         return first_state(self._now, self._setting, flag("requires_grad", requires_grad))
 
     def differentiable_step(self, state: EnvState, action: Any) -> tuple[EnvState, Any, Any]:
-        """Take one action in torch: returns (next state, observation, reward) with gradients by the state and the action.
+        """Take one action in torch: returns (next state, observation, reward) with gradients with respect to the state
+        and the action.
 
         state: of `differentiable_state` or of the step before; state.detach() ends gradients there. action: tensor of
         shape (k,), each number from -1 to 1; where it is clipped its gradient is zero. The observation is a tensor of the

@@ -143,7 +143,7 @@ class _Solves:
         return tuple(each.reshape((*axes, *each.shape[1:])) for each in (positions, edge_rotations))
 
     def gradients(self, ndims: tuple[int, ...], arrays: Any, by_results: Any) -> tuple[np.ndarray, ...]:
-        """Return the gradients by the arrays; a solve that is not kept any more is repeated."""
+        """Return the gradients with respect to the arrays; a solve that is not kept any more is repeated."""
         numbers, axes = self._members(ndims, arrays)
         by_positions, by_rotations = (
             np.asarray(each).reshape((-1, *shape))

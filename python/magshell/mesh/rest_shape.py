@@ -100,18 +100,24 @@ def shape_gradients(mesh: TriangleMesh, faces: np.ndarray) -> np.ndarray:
 
 
 def by_areas(mesh: TriangleMesh, faces: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from that by the areas of some faces (k,)."""
+    """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to the areas of some faces
+    (k,).
+    """
     of_areas = (gradient * mesh.face_areas[faces])[:, None, None]
     return _summed(mesh, mesh.faces[faces], of_areas * shape_gradients(mesh, faces))
 
 
 def by_edge_vectors(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from those by the vectors along some edges, (k, 3)."""
+    """Return the gradient with respect to the rest positions, (n_v, 3), from those with respect to the vectors along some
+    edges, (k, 3).
+    """
     return _summed(mesh, mesh.edges[edges], np.stack([-gradient, gradient], axis=1))
 
 
 def by_lengths(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from that by the lengths of some edges (k,)."""
+    """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to the lengths of some
+    edges (k,).
+    """
     if isinstance(mesh, QuadraticTriangleMesh):
         return by_nodal_lengths(mesh, edges, np.repeat(gradient[:, None], 3, axis=1))
     ends = mesh.rest_positions[mesh.edges[edges]]
@@ -121,7 +127,9 @@ def by_lengths(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray) -> n
 
 
 def by_nodal_areas(mesh: Any, faces: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from that by `nodal_areas(mesh, faces)`, (k, 3) or (k, 6)."""
+    """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to `nodal_areas(mesh,
+    faces)`, (k, 3) or (k, 6).
+    """
     nodes, parts = sides(mesh)
     if parts == 1:
         return by_areas(mesh, faces, gradient.mean(axis=1))
@@ -136,13 +144,17 @@ def by_nodal_areas(mesh: Any, faces: np.ndarray, gradient: np.ndarray) -> np.nda
 
 
 def by_nodal_element_areas(mesh: QuadraticTriangleMesh, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from that by the areas of the elements' nodes, (n, 6)."""
+    """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to the areas of the
+    elements' nodes, (n, 6).
+    """
     nodes = mesh.elements
     return _summed(mesh, nodes, six_node_checks.by_shape_integrals(mesh.rest_positions[nodes], gradient))
 
 
 def by_nodal_lengths(mesh: Any, edges: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from that by `nodal_lengths(mesh, edges)`, (k, 2) or (k, 3)."""
+    """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to `nodal_lengths(mesh,
+    edges)`, (k, 2) or (k, 3).
+    """
     if not isinstance(mesh, QuadraticTriangleMesh):
         return by_lengths(mesh, edges, gradient.mean(axis=1))
     nodes = mesh.nodes_of_edges[edges]
@@ -150,8 +162,8 @@ def by_nodal_lengths(mesh: Any, edges: np.ndarray, gradient: np.ndarray) -> np.n
 
 
 def by_width(mesh: Any, gradient: float) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from that by twice the distance of the farthest vertex from the
-    middle of the surface, `width_of`."""
+    """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to twice the distance of
+    the farthest vertex from the middle of the surface, `width_of`."""
     x, corners = mesh.rest_positions, mesh.rest_positions[mesh.faces].mean(axis=1)
     shares = mesh.face_areas / mesh.face_areas.sum()
     middle = shares @ corners
@@ -169,7 +181,8 @@ def by_width(mesh: Any, gradient: float) -> np.ndarray:
 
 
 def by_continuations(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from that by `continuations(mesh, edges)`, (k, 3).
+    """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to `continuations(mesh,
+    edges)`, (k, 3).
 
     These are t x n, with the unit vector t along the edge as its first face runs it, and the normal n of that face.
     """
@@ -191,7 +204,8 @@ def by_continuations(mesh: TriangleMesh, edges: np.ndarray, gradient: np.ndarray
 
 
 def by_nodal_volumes(mesh: TetMesh, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the rest positions, (n_v, 3), from that by integrals of the shape functions of all tetrahedra.
+    """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to integrals of the shape
+    functions of all tetrahedra.
 
     gradient: (n_t, 4) or (n_t, 10).
     """

@@ -54,11 +54,12 @@ _OF_MESH = (
 class MeshedOutline(Frozen):
     """Moves the borders and slits of a flat sheet, in the plane z = 0, by control points. Needs the extra `gmsh`.
 
-    `positions` gives rest positions for a solve, differentiable by the control numbers: borders and slits move with them,
-    and the vertices inside follow harmonically. If a face becomes stretched or compressed by more than `most_stretch`, the
-    sheet is meshed anew at the control numbers given: `mesh` is then a new object, for which a new scene is made. Variables
-    of the design are control numbers and values on the first mesh, so an optimizer keeps its state. `transferred` brings
-    values of faces of the first mesh to the current one, with the material. An objective jumps by the discretization error.
+    `positions` gives rest positions for a solve, differentiable with respect to the control numbers: borders and slits
+    move with them, and the vertices inside follow harmonically. If a face becomes stretched or compressed by more than
+    `most_stretch`, the sheet is meshed anew at the control numbers given: `mesh` is then a new object, for which a new
+    scene is made. Variables of the design are control numbers and values on the first mesh, so an optimizer keeps its
+    state. `transferred` brings values of faces of the first mesh to the current one, with the material. An objective
+    jumps by the discretization error.
 
     borders: `Polygon`, `ClosedSpline` or `Circle`, the outer one first, then holes. slits: a list of `Slit`. None may meet.
     size: the target length of edges, m. most_stretch: above 1. on_remesh: called with the mesh before, as it was stretched,

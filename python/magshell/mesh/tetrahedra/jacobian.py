@@ -191,7 +191,8 @@ def shape_integrals(node_positions: np.ndarray) -> np.ndarray:
 
 
 def by_shape_integrals(node_positions: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the nodes of ten-node tetrahedra, (n_t, 10, 3), from that by `shape_integrals`, (n_t, 10).
+    """Return the gradient with respect to the nodes of ten-node tetrahedra, (n_t, 10, 3), from that with respect to
+    `shape_integrals`, (n_t, 10).
 
     A Jacobian determinant x_1 . (x_2 x x_3) with the columns x_a = dX/dxi_a changes by x_2 x x_3 . dx_1 and so on.
     """

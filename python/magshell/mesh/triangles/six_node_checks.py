@@ -73,7 +73,9 @@ def shape_integrals(positions: np.ndarray, part: np.ndarray | None = None) -> np
 def by_shape_integrals(
     positions: np.ndarray, gradient: np.ndarray, part: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the gradient by the nodes of elements, (n, 6, 3), from that by their `shape_integrals`, (n, 6)."""
+    """Return the gradient with respect to the nodes of elements, (n, 6, 3), from that with respect to their
+    `shape_integrals`, (n, 6).
+    """
     points, weights = rule(_REFERENCE_TRIANGLE if part is None else _NODES[part])
     values, slopes = shapes(points)
     along = np.einsum("pan,kni->apki", slopes, positions)
@@ -106,7 +108,9 @@ def edge_integrals(positions: np.ndarray) -> np.ndarray:
 
 
 def by_edge_integrals(positions: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return the gradient by the nodes of edges, (k, 3, 3), from that by their `edge_integrals`, (k, 3)."""
+    """Return the gradient with respect to the nodes of edges, (k, 3, 3), from that with respect to their
+    `edge_integrals`, (k, 3).
+    """
     at, lengths = np.polynomial.legendre.leggauss(5)
     s, weights = (at + 1) / 2, lengths / 2
     values = np.stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)], axis=1)

@@ -184,8 +184,8 @@ class Contact(Owner):
             numbers[label, name] = number
 
     def _by_thickness(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
-        """Return the gradient by the thickness of each face of the sheets, on which the default smoothing in `_law`
-        depends.
+        """Return the gradient with respect to the thickness of each face of the sheets, on which the default smoothing in
+        `_law` depends.
         """
         by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
         return (
@@ -195,7 +195,7 @@ class Contact(Owner):
         )
 
     def _by_width(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
-        """Return the gradient by the largest width of the bodies, on which the defaults in `_law` depend."""
+        """Return the gradient with respect to the largest width of the bodies, on which the defaults in `_law` depend."""
         of_sheets = any(isinstance(sheet, Shell) for sheet in sheets)
         found = 0.0
         if self.sticking_speed is None:

@@ -102,7 +102,7 @@ class GradientSampler:
 
 
 class CustomField(AppliedField):
-    """A field given by a Python function, and its gradient by another one or by differences.
+    """A field given by a Python function, and its gradient, given by another function or computed by differences.
 
     Derivatives that are not given are central differences of sixth order, with steps of 0.004 length
     scales, up to three of them from the point along the axes and their diagonals. Their relative error is

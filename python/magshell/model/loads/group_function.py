@@ -100,7 +100,7 @@ class GroupFunction:
         return arrays
 
     def rate_by_values(self, positions: np.ndarray, values: np.ndarray, rates: np.ndarray) -> np.ndarray:
-        """Return the derivatives of rates . gradient by all values, (m,)."""
+        """Return the derivatives of rates . gradient with respect to all values, (m,)."""
         with self._plain_torch():
             along = self._tensors(positions), self._tensors(rates)
             return self._summed(self._power_by_values(*along, *self._numbers(values)))
@@ -202,7 +202,9 @@ class GroupFunction:
         return found
 
     def _summed(self, by_groups: tuple[torch.Tensor, ...]) -> np.ndarray:
-        """Return derivatives by all values in one array from those of each group; shared values get their sum."""
+        """Return derivatives with respect to all values in one array from those of each group; shared values get their
+        sum.
+        """
         parts = [
             each if shape and shape[0] == self._groups else each.sum(dim=0)
             for each, shape in zip(by_groups, self._shapes.values(), strict=True)

@@ -70,8 +70,8 @@ class RigidBodyPoints(NamedTuple):
         return np.concatenate([[part.mass], part.mass * center, [second[i, j] for i, j in _PAIRS]])
 
     def masses_vjp(self, part: RigidBody, by_masses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the gradients by mass (), by inertia in the shape it was given in, and by center (3,), given that by
-        the masses.
+        """Return the gradients with respect to mass (), to inertia in the shape it was given in, and to center (3,),
+        given that with respect to the masses.
         """
         by = np.linalg.solve(_MOMENTS.T, by_masses)
         center, _ = self._local(part)

@@ -281,9 +281,9 @@ class Revolute(Joint):
         limits. `result[hinge].motor_torque` is the torque of the motor, of second order in the time step in motions.
     rate: rad/s, the rate of the angle at the start of a motion from rest positions, in a tree without vertices.
 
-    A solve may replace all of them, the links being the same at rest. The gradient by the axis is perpendicular to it,
-    as its length has no effect. All but the rate, origin and axis may change in ms.simulate, with one value for each
-    step or for the ends of all steps.
+    A solve may replace all of them, the links being the same at rest. The gradient with respect to the axis is
+    perpendicular to it, as its length has no effect. All but the rate, origin and axis may change in ms.simulate, with
+    one value for each step or for the ends of all steps.
 
     >>> import numpy as np
     >>> import magshell as ms

@@ -29,8 +29,8 @@ class Skeleton(Frozen):
     Soft material is attached to a link by vertices, Link(vertices=..., body=solid). Joints hold to round-off, also over
     many steps. Values of joints are given by the joint, values={hinge: {"torque": ...}}, and may change in time;
     `result[hinge].angle` and `result[link]` describe the motion. ms.simulate integrates a skeleton by TRBDF2 or
-    ImplicitEuler. There are gradients by all values of joints, also by their origins and axes. In motions of long
-    chains (200 links) the angles come from positions far from the origin, and their round-off exceeds the default
+    ImplicitEuler. There are gradients with respect to all values of joints, also to their origins and axes. In motions of
+    long chains (200 links) the angles come from positions far from the origin, and their round-off exceeds the default
     tolerance of solvers: use ms.MixedNewton(tolerance=1e-8).
 
     >>> import numpy as np

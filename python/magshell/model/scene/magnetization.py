@@ -79,7 +79,9 @@ def magnetization_rows(scene: Scene, magnetization: np.ndarray) -> Iterator[tupl
 
 
 def gradient_by_all(scene: Scene, gradient: Any) -> np.ndarray:
-    """Return the gradient by the magnetization of all faces, (n_f of all, 3): the transpose of `magnetization_rows`."""
+    """Return the gradient with respect to the magnetization of all faces, (n_f of all, 3): the transpose of
+    `magnetization_rows`.
+    """
     labels = {id(each): label for each, label in scene._labels}
     found = np.zeros((scene._bodies.n_magnetized, 3))
     for _, body, faces in magnetized_bodies(scene):

@@ -301,8 +301,8 @@ class Shell(Owner):
             numbers[label, "susceptibility"] = self.susceptibility
 
     def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
-        """Return the gradients by its values, including those through the vertex masses and through the thickness in
-        contacts.
+        """Return the gradients with respect to its values, including those through the vertex masses and through the
+        thickness in contacts.
         """
         found = {name: gradient.value(label, name) for name in self._stiffnesses}
         for name in ("remanent_magnetization", "susceptibility"):
@@ -406,7 +406,9 @@ class Shell(Owner):
         return masses
 
     def _by_rest_masses(self, by_masses: np.ndarray, weighed: bool) -> np.ndarray:
-        """Return the gradient by the rest positions, (n_v, 3), from that by the masses of the vertices, (n_v,)."""
+        """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to the masses of the
+        vertices, (n_v,).
+        """
         by_nodes = by_masses[self.mesh.elements] * self._areal_masses[:, None]
         if self.mesh.order == 1:
             return by_areas(self.mesh, np.arange(self.mesh.n_faces), by_nodes.mean(axis=1))

@@ -129,7 +129,7 @@ class Skin(Owner):
         return variant(made, _corners=self._corners, _areas=self._areas)
 
     def _gradients(self, label: str, values: Any, gradient: Any) -> dict[str, np.ndarray]:
-        """Return the gradients by its values, including those through the vertex masses."""
+        """Return the gradients with respect to its values, including those through the vertex masses."""
         found = {
             "thickness": np.zeros(len(self.faces)),
             "remanent_magnetization": np.zeros((len(self.faces), 3)),
@@ -156,7 +156,9 @@ class Skin(Owner):
         return masses
 
     def _by_rest_masses(self, mesh: TetMesh, by_masses: np.ndarray) -> np.ndarray:
-        """Return the gradient by the rest positions of its solid, (n_v, 3), from that by `masses`, (n_v,)."""
+        """Return the gradient with respect to the rest positions of its solid, (n_v, 3), from that with respect to
+        `masses`, (n_v,).
+        """
         if self.mass_density is None:
             return np.zeros((mesh.n_vertices, 3))
         by_areas_here = by_masses[self._corners].mean(axis=1) * self.thickness * self.mass_density

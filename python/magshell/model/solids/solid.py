@@ -193,7 +193,9 @@ class Solid(Owner):
             numbers[label, "remanent_magnetization"] = self.remanent_magnetization
 
     def _gradients(self, label: str, values: Values, gradient: Gradient) -> dict[str, np.ndarray]:
-        """Return the gradients by its values, including those through the masses and the weights of the vertices."""
+        """Return the gradients with respect to its values, including those through the masses and the weights of the
+        vertices.
+        """
         names = [*self.material.names, "remanent_magnetization"]
         found = {name: gradient.value(label, name) for name in names if gradient.has(label, name)}
         if "fibres" in found:
@@ -227,7 +229,9 @@ class Solid(Owner):
         return volumes * _LUMPED["quadratic"], shape_integrals(self.mesh.rest_positions[self.mesh.tetrahedra])
 
     def _by_rest_masses(self, by_masses: np.ndarray, weighed: bool) -> np.ndarray:
-        """Return the gradient by the rest positions, (n_v, 3), from that by the masses of the vertices, (n_v,)."""
+        """Return the gradient with respect to the rest positions, (n_v, 3), from that with respect to the masses of the
+        vertices, (n_v,).
+        """
         by_integrals = self.mass_density[:, None] * by_masses[self.mesh.tetrahedra]
         if not weighed:  # parts of the volume, which is the sum of the integrals
             by_volumes = by_integrals @ _LUMPED[self.element]

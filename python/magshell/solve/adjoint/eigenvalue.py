@@ -53,7 +53,7 @@ class EigenvalueAdjoint(ABC):
         """Return the gradients of an eigenvalue by all inputs, one for each set of load parameters."""
 
     def gradients(self, by_outputs: list[np.ndarray], wanted: Sequence[bool]) -> list[np.ndarray | None]:
-        """Compute the gradients by the wanted leaves of the inputs, each in the shape of its leaf.
+        """Compute the gradients with respect to the wanted leaves of the inputs, each in the shape of its leaf.
 
         Raises NoGradient where there is none.
         """
@@ -150,7 +150,8 @@ class FrequencyAdjoint(EigenvalueAdjoint):
 
 
 def through_equilibrium(residual: Residual, slopes: Slopes) -> Slopes:
-    """Return the derivatives by values and load parameters also through the equilibrium, which changes with them.
+    """Return the derivatives with respect to values and load parameters also through the equilibrium, which changes with
+    them.
 
     Those by unknowns are left to what supports prescribe.
     """

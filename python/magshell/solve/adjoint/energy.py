@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 POSITIONAL = ("positions", "edge_rotations")  # names of the leaves that are no values
 
-# The first step (1), as a fraction of the value, and the steps of a value that is zero (SI units of the value); each
-# is tried with these fractions (1) of it until both orders agree. Tested by
+# The first step of differences (1), as a fraction of the value; the step of a value that is zero (SI units of the value);
+# and the fractions (1) of the first step that are tried until the differences of both orders agree. Tested by
 # test_first_derivatives_by_values_agree_with_differences.
 _STEP, _STEP_AT_ZERO, _SHORTER = 1 / 64, 1e-2, (1.0, 1e-1, 1e-2, 1e-3, 1e-4)
 # Both orders agree if their difference is at most this fraction (1) of the largest derivative. Tested by
@@ -32,7 +32,7 @@ _AGREE = 1e-8
 
 
 class Unknowns:
-    """The order of the positions and edge rotations of a caller among all unknowns of the core, by a sparse matrix.
+    """Sparse matrices between the positions and edge rotations of a caller and all unknowns of the core.
 
     Raises ValueError, with the name of the function that needs it, for a scene whose unknowns are not its vertices
     and edges alone: with rigid bodies or skeletons.
@@ -112,7 +112,7 @@ class EnergyAdjoint:
 
     def _gradient(self, load_parameters: np.ndarray) -> np.ndarray:
         state = self.state(load_parameters)
-        self._model.term_energies(state, [], load_parameters)  # sets the turns of angles to those at rest
+        self._model.term_energies(state, [], load_parameters)  # sets the branches of angles to those at rest
         return self._model.gradient(state, load_parameters)
 
     @property
@@ -134,7 +134,7 @@ class EnergyAdjoint:
         )
 
     def _names(self, state: np.ndarray, load_parameters: np.ndarray) -> list[str]:
-        """Return the names of `by_name`, and set the turns of angles to those at rest."""
+        """Return the names of `by_name`, and set the branches of angles to those at rest."""
         return [*dict.fromkeys(name for name, _ in self._model.term_energies(state, [], load_parameters))]
 
     @cached_property

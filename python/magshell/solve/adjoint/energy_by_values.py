@@ -1,4 +1,5 @@
-"""Second derivatives of energies that begin with gradients by values. Works on arrays; autograd.py has the tensors.
+"""Second derivatives of energies that begin with gradients with respect to values. Works on arrays; autograd.py has the
+tensors.
 
 For a sum of energies E with weights w, and a direction u of the values k, u . dE/dk has these derivatives, each of them a
 rate of change along u:
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 
 # Fractions (1) of the first step that are tried. Tested by test_second_derivatives_by_values_agree_with_differences.
 _SHORTER = (1.0, 0.1, 1e-2)
-# The error (1) of derivatives by values, over their largest entry: they are differences themselves. Tested by the same.
+# The error (1) of derivatives with respect to values, over their largest entry: they are differences themselves. Tested
+# by the same.
 _OF_DIFFERENCES = 1e-11
 
 

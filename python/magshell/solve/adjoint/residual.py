@@ -3,7 +3,8 @@
     w . g(q, k)                 derivatives by q: H w,  by values and load parameters k: w . dg/dk
     v . H(q, k) w               the same, differentiated along v by differences of high order
 
-The second one contracts the third derivatives of the energy twice. It is what an eigenvalue of the stiffness changes by.
+The second one contracts the third derivatives of the energy twice. It is the derivative of an eigenvalue of the stiffness
+with eigenvector v = w.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _OF_DIFFERENCES = 1e-11
 
 
 class Slopes(NamedTuple):
-    """The derivatives of a number by all unknowns of the core, by all values and by all load parameters.
+    """The derivatives of a number with respect to all unknowns of the core, all values and all load parameters.
 
     by_rest: those through the shape of bodies at rest, three numbers per node; empty unless rest positions are inputs.
     """
@@ -63,9 +64,9 @@ class Slopes(NamedTuple):
 class Residual:
     """The gradient g of the energy at a state with load parameters, and derivatives of its products with motions.
 
-    angle_branches: the full turns of angles there, as Equilibrium has them. with_rest: whether rest positions are inputs.
-    The core must hold the values of the inputs while the methods run. These raise NoGradient in scenes of which the state is
-    more than positions and edge rotations.
+    angle_branches: the numbers of full turns of the angles there, as Equilibrium has them. with_rest: whether rest positions
+    are inputs. The core must hold the values of the inputs while the methods run. They raise NoGradient in scenes with rigid
+    bodies or skeletons.
     """
 
     def __init__(

@@ -160,7 +160,7 @@ class ResponseAdjoint:
     def _solved(self, forces: np.ndarray) -> np.ndarray:
         """Return the solution of K x = forces (n,) of the free unknowns, zero for the others, of all unknowns."""
         here, model = self._here, self._model
-        here.gradient()  # sets the turns of angles, from which K is assembled
+        here.gradient()  # sets the branches of angles, from which K is assembled
         try:
             found = model.expand(self._solve(forces))
         except ValueError as error:
@@ -241,7 +241,7 @@ class ResponseAdjoint:
         else:
             inputs = self._inputs_of(part)
             at, steps = self._rows_by_value(inputs, leaf, part, change), steps_along(inputs, leaf, change)
-        here.gradient()  # sets the turns of angles
+        here.gradient()  # sets the branches of angles
         try:
             rates = directional_derivative(at, steps)
         finally:

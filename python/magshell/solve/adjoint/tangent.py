@@ -40,7 +40,9 @@ def state_tangent(inputs: Inputs, found: _core.StaticsResult, along: list[np.nda
     total = np.zeros((4, model.size))  # of the gradient, of what is prescribed, and of what joints carry
     with inputs.in_core():
         try:
-            model.term_energies(found.state, found.turns, inputs.load_parameters)  # sets the turns of angles
+            model.term_energies(
+                found.state, found.turns, inputs.load_parameters
+            )  # sets the branches of angles
             for leaf, change in zip(inputs.leaves, along, strict=True):
                 if np.any(change):
                     rates = _rates(inputs, found, leaf, change)

@@ -150,10 +150,10 @@ def simulate(
     length, like one whose error is too large. ms.StepErrorWarning warns of steps that are too long. Raises NotConverged and
     Interrupted with the motion so far as `last_good`, and ValueError on bad input.
 
-    If an input is a torch tensor, positions, velocities and edge rotations are tensors, with gradients by every continuous
-    input, including time_step, damping, start (positions or an Equilibrium) and velocities. An input without a gradient (a
-    Trajectory as start; time_step if a function of the time leaves torch) raises NoGradient. So do second derivatives; the
-    product of the Hessian with v is (g(x + h v) - g(x - h v)) / 2h.
+    If an input is a torch tensor, positions, velocities and edge rotations are tensors, with gradients with respect to
+    every continuous input, including time_step, damping, start (positions or an Equilibrium) and velocities. An input
+    without a gradient (a Trajectory as start; time_step if a function of the time leaves torch) raises NoGradient. So do
+    second derivatives; the product of the Hessian with v is (g(x + h v) - g(x - h v)) / 2h.
 
     Tangents (forward mode: torch.autograd.forward_ad, torch.func.jvp and jacfwd) follow a change of the inputs through the
     stages. One that is asked for with the motion (dual numbers, torch.func.jvp) is computed step by step with the

@@ -206,15 +206,17 @@ class TimeSteps:
 
     @cached_property
     def _changes(self) -> Any:
-        """The changes of the times at which steps begin, (m + 1,): zeros with the gradient by listed lengths."""
+        """The changes of the times at which steps begin, (m + 1,): zeros with the gradient with respect to listed
+        lengths.
+        """
         import torch
 
         lengths = self.listed.double()
         return torch.nn.functional.pad((lengths - lengths.detach()).cumsum(0), (1, 0))
 
     def changes_of_fractions(self, steps: np.ndarray, fractions: np.ndarray) -> Any:
-        """Return the changes of places in intervals, at fractions (k,) of steps (k,): zeros with the gradient by listed
-        lengths.
+        """Return the changes of places in intervals, at fractions (k,) of steps (k,): zeros with the gradient with
+        respect to listed lengths.
 
         None if places are constant, as in intervals of one step.
         """
@@ -281,7 +283,9 @@ class TimePoints:
 
     @cached_property
     def changes_of_fractions(self) -> Any:
-        """The changes of `fractions_of_intervals`: zeros with the gradient by listed lengths of steps; None if constant."""
+        """The changes of `fractions_of_intervals`: zeros with the gradient with respect to listed lengths of steps; None
+        if constant.
+        """
         steps = np.arange(len(self.steps)).repeat(len(self.fractions))
         return self.steps.changes_of_fractions(steps, np.tile(self.fractions, len(self.steps)))
 

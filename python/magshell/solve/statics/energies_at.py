@@ -56,21 +56,21 @@ def energies(
 
     positions: (n_v, 3) m. edge_rotations: (n_e,) rad, as a result has them, of sheets with bending="midedge"; by default
         none, which leaves the normals across edges half-way between those of their faces.
-    body: of the scene: its elastic energies alone, "membrane" and "bending" of a Shell, "solid" of a Solid.
-    by: "face" or "tetrahedron": the energies of every element of the body, {name: (n,) J}, elastic and magnetic ones; of a
-        sheet with six-node faces, of these. Their sums are the energies of the body. Others, such as those of loads and
-        contact, do not belong to elements and are left out. A scene of one Shell or Solid needs no `body`.
+    body: a body of the scene, to get its elastic energies alone: "membrane" and "bending" of a Shell, "solid" of a Solid.
+    by: "face" or "tetrahedron", to get the elastic and magnetic energies of every element of the body, {name: (n,) J}. Their
+        sums are the energies of the body. Energies of loads and contact do not belong to elements and are left out. A scene
+        of one Shell or Solid needs no `body`.
 
     {keywords}
     values: as in ms.equilibrium.
 
     At the positions of an equilibrium these are its `energies`. The directions that clamps prescribe are used; other
-    prescribed displacements are not. Tensors get energies that are tensors: see ms.energy. Single
-    energies have the same derivatives as their sum; their second ones by positions are differences of gradients. Energies
-    of one body have none: ValueError; those of elements have none: NoGradient.
+    prescribed displacements are not. If an input is a tensor, so are the energies: see ms.energy. Single energies have the
+    same derivatives as their sum; their second derivatives with respect to positions are differences of gradients. Energies
+    of one body (ValueError) and of elements (NoGradient) have no derivatives.
 
-    Raises ValueError on bad input, and where there is no energy: bodies in contact intersect or are nearer than
-    they may be, or elements are inside out whose material does not bear it.
+    Raises ValueError on bad input, and where the energy is not defined: bodies in contact intersect or are nearer than
+    allowed, or elements are turned inside out whose material does not allow it.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -232,14 +232,14 @@ def hessian(
     """Compute the Hessian of ms.energy at given positions, a symmetric scipy.sparse matrix.
 
     positions: (n_v, 3) m. edge_rotations: (n_e,) rad, as in ms.energies.
-    reduced: of the free unknowns alone: B^T H B, with B of ms.free_motions. By default H has the order of
-        positions.ravel(), then of the edge rotations: 3 n_v + n_e rows; those of edges that cannot rotate are zero.
+    reduced: whether to return B^T H B for the free unknowns alone, with B of ms.free_motions. By default H has 3 n_v +
+        n_e rows in the order of positions.ravel(), then of the edge rotations; rows of edges that cannot rotate are zero.
 
     {keywords}
     values: as in ms.equilibrium.
 
-    It is not projected: away from an equilibrium it may be indefinite. What couples all vertices, such as the pressure of a
-    cavity, fills it.
+    The Hessian is not projected: away from an equilibrium it may be indefinite. Terms that couple all vertices, such as the
+    pressure of a cavity, make it dense.
 
     Raises ValueError as ms.forces does, and for tensors that require a gradient.
 
@@ -286,9 +286,8 @@ def free_motions(scene: Scene) -> Any:
     order, model = Unknowns("free_motions", scene), scene._model
     free = np.arange(model.free_size)
     rows, columns, entries = [], [], []
-    for first in range(
-        3
-    ):  # the free unknowns of one vertex follow each other, at most three: one of them at a time
+    # A vertex has at most three free unknowns, numbered one after another: every third unknown at a time.
+    for first in range(3):
         some = free % 3 == first
         values = model.expand(some.astype(float))
         there = np.flatnonzero(np.abs(values) > 1e-12)  # 1: a direction's component, of at most 1

@@ -53,8 +53,8 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     parameters: (n,), 0 at the load parameters of the start, 1 at the new ones. positions: (n, n_v, 3) m.
     n_negative_eigenvalues: (n,), zero where the equilibrium is stable. critical: CriticalPoints, in order.
     remanent_magnetization: (n_f, 3) or (3,) A/m, or None.
-    largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
-        leaves the model, of which ms.LargeStrainWarning warns.
+    largest_membrane_strain, largest_bending_strain: (n,), 1, the largest magnitudes of the strains that `strains` returns.
+        The model is for strains below 0.2; ms.LargeStrainWarning warns beyond.
     """
 
     scene: Scene
@@ -140,9 +140,9 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     def events(self) -> tuple[PathEvent, ...]:
         """The events along the path, in order: its critical points, and contacts that are made and lost.
 
-        The contact of each pair of a body and an obstacle, or of two bodies, is made where the first of its points touch and
-        lost where the last ones part. Where it changes between two points, equilibria between them are solved for until its
-        parameter is known to a millionth of the step.
+        A contact, of a body and an obstacle or of two bodies, is made where its first points touch and lost where its
+        last ones part. If this happens between two points of the path, equilibria between them are computed until the
+        parameter of the event is known to a millionth of the step.
         """
         return events_along(self)
 
@@ -297,18 +297,16 @@ def follow_path(
     `min_parameter`, or where until(parameter, positions) returns True.
 
     {keywords}
-    values: as in ms.equilibrium. Places of field sources, obstacles and supports, and activations of muscles, that
-    differ from
-        those of `start` change linearly along the path; everything else has to be the same.
+    values: as in ms.equilibrium. Places of field sources, obstacles and supports, and activations of muscles, change
+        linearly along the path from those of `start` to these; all other values must be the same as those of `start`.
 
-    first_step: of the parameter. max_step: the largest root mean square displacement between points, over the mesh's size.
+    first_step: change of the parameter in the first step. max_step: the largest root mean square displacement between two
+        points, over the mesh's size. max_points: the largest number of points.
     locate_critical: whether to find limit points and bifurcations between points whose numbers of unstable directions
-    differ.
+        differ.
     progress: show a bar once a path has taken two seconds.
 
     Raises NotConverged and Interrupted with the path so far as `last_good`; ValueError on bad input.
-
-    max_points: the largest number of points.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -344,8 +342,8 @@ def follow_path(
         inputs = keeping_fine_faces(inputs, start._values)
     state, angle_branches, from_, _ = starting_point(scene, start, inputs)
     interrupted = False
-    if start is None:  # an equilibrium would be none with other fine faces
-        try:  # a field may be a function of the caller's, in which Ctrl-C can come
+    if start is None:  # a given equilibrium keeps its fine faces: with others it would not be in equilibrium
+        try:  # Ctrl-C may arrive in a field that is a Python function of the caller
             inputs = with_fine_faces(inputs, state, inputs.load_parameters)
         except KeyboardInterrupt:
             interrupted = True
@@ -380,8 +378,8 @@ def _follow(
 ) -> EquilibriumPath:
     """Follow a path in the core.
 
-    start: its state, the branches of its angles and the load parameters at parameter 0, and the Equilibrium there, or None.
-    interrupted: whether Ctrl-C came already; the path ends at its start then.
+    start: the state at parameter 0, the branches of its angles, its load parameters, and the Equilibrium there, or None.
+    interrupted: whether Ctrl-C has arrived already; the path then ends at its start.
     """
     scene = inputs.scene
     state, angle_branches, from_, first = start
@@ -416,7 +414,7 @@ def _follow(
     strain = StrainHistory(path.largest_membrane_strain, path.largest_bending_strain)
     k = strain.worst
     warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
-    try:  # a field may be a function of the caller's, in which Ctrl-C can come
+    try:  # Ctrl-C may arrive in a field that is a Python function of the caller
         _warn_of_fields(path)
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", path) from stopped
@@ -424,7 +422,7 @@ def _follow(
 
 
 def _warn_of_fields(path: EquilibriumPath) -> None:
-    """Warn of the point at which the magnetic force is off most, if it is by too much."""
+    """Warn of the point with the largest error of the magnetic force, if this error is too large."""
     if not len(path):
         return
     errors = np.array([point.field_sampling_error for point in path._points])
@@ -440,7 +438,7 @@ def _warn_of_fields(path: EquilibriumPath) -> None:
 
 
 def _bending_energies(scene: Scene, found, load_parameters) -> list[float]:
-    """Return the bending energies of the points if the mesh has obtuse faces, to which they matter; else none."""
+    """Return the bending energies of the points if the mesh has obtuse faces, for whose warning they are needed; else []."""
     if not scene._bodies.flat_sheets_alone or not scene._obtuse_faces.faces.size:
         return []
     return [scene._model.energies(point.state, load_parameters).get("bending", 0.0) for point in found.points]

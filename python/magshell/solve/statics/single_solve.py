@@ -39,7 +39,8 @@ if TYPE_CHECKING:
     from ..._input.kinds import Starting
 
 
-# Searches with more fine faces that one search is followed by at most; each adds faces, so that one is usually enough.
+# Largest number of repeated searches, each with more faces that sample the field finely than the one before; one is
+# usually enough.
 _MOST_REFINEMENTS = 4
 
 
@@ -59,7 +60,8 @@ def _ignore(text: str) -> None:
 class Search:
     """The options of a search for an equilibrium. Raises ValueError for an option of the wrong kind.
 
-    progress: called with the fraction of the way and the residual. note: called with a text on the progress.
+    progress: called with the fraction of the load path that is done, and the residual. note: called with a text on the
+        progress.
     ignore_velocity_forces: leave out friction and water.
     """
 
@@ -102,13 +104,14 @@ def find(
     moving = None
     if isinstance(start, Equilibrium) and start.scene is scene and not at_rest:
         at_rest = all_can_move(inputs, start)
-        # Obstacles and supports push bodies along, and pass through them where they jump.
+        # Obstacles and supports are moved along the path, so that they push bodies; if they jumped, they would pass
+        # through them.
         moving = AlongPath(inputs, start, at_once=True) if scene.obstacles and not at_rest else None
         moving = AlongPath(inputs, start) if at_rest else moving
     options = search.options()
     options.start_at_rest = at_rest
     options.keep_factor = store_factor
-    # A load step fills a volume by at most the same fraction of its rest volume as the step is of the way.
+    # A load step changes the volume of a cavity by at most the step's fraction of the load path times the volume at rest.
     filling = max((each._filling(scene) for each in map(inputs.values.current, scene.actuators)), default=0.0)
     options.smallest_step /= max(filling, 1.0)
     with inputs.in_core():
@@ -155,7 +158,7 @@ def solve(
     moving: values of the scene that change along with the load parameters.
     """
     scene, entries, end = inputs.scene, [], to
-    try:  # a field may be a function of the caller's, in which Ctrl-C can come
+    try:  # Ctrl-C may arrive in a field that is a Python function of the caller
         inputs = with_fine_faces(inputs, state, to)
     except KeyboardInterrupt:
         progress = stop_at_once
@@ -203,7 +206,7 @@ def solve(
     layout = scene._load_parameter_layout
     field_factor = float(layout.of(found.load_parameters, "scene", "field_factor")[0])
     flux_density = layout.of(found.load_parameters, "scene", "applied_flux_density")[0]
-    try:  # a field may be a function of the caller's, in which Ctrl-C can come
+    try:  # Ctrl-C may arrive in a field that is a Python function of the caller
         if is_suspect(found.field_sampling_error):
             warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
     except KeyboardInterrupt as stopped:
@@ -218,8 +221,9 @@ def _with_fine_faces_at_end(
     options: _core.StaticsOptions,
     progress: Callable[[float, float], None] | None,
 ) -> tuple[_core.StaticsResult, Inputs, KeyboardInterrupt | None]:
-    """Return the result and the inputs after further searches with more fine faces, as long as the state needs more, and the
-    Ctrl-C that came while this was computed.
+    """Repeat the search with more faces that sample the field finely, until the state needs no more.
+
+    Returns the result, the inputs, and the KeyboardInterrupt that was raised meanwhile, or None.
     """
     for _ in range(_MOST_REFINEMENTS):
         if found.outcome != _core.Outcome.converged:
@@ -248,7 +252,7 @@ def _with_fine_faces_at_end(
 
 
 def _energies(scene: Scene, found) -> dict[str, float] | None:
-    """Return the energies by term; None if Ctrl-C came meanwhile in a field function of the caller."""
+    """Return the energies by term; None if Ctrl-C arrived meanwhile in a field function of the caller."""
     try:
         return scene._model.energies(found.state, found.load_parameters)
     except KeyboardInterrupt:
@@ -263,7 +267,7 @@ def _result(
     strain: Largest,
     wall_time: float,
 ) -> Equilibrium:
-    """Return the result. The scene is not held meanwhile: tensors with tangents have theirs computed at once."""
+    """Make the Equilibrium. The lock on the scene must be free: tangents of tensors in forward mode are computed here."""
     scene = inputs.scene
     points, edge_rotations, driving = _outputs(inputs, found, arrays)
     n_v = scene.mesh.n_vertices

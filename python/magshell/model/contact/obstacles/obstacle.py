@@ -32,9 +32,9 @@ class Obstacle(Owner, ABC):
         center: (3,) m.
         rotation: rotation vector (3,) rad, about the center.
         motion: None, or a function of the time [s] that returns a displacement (3,) m, or (displacement (3,) m,
-            rotation vector (3,) rad), in world axes. It must be smooth: it is differentiated by its values within
-            2e-4 s before and after a time (4e-4 s after it at the start, never before time 0). For gradients by the
-            path, give center and rotation over time among the values of ms.simulate instead.
+            rotation vector (3,) rad), in world axes. It must be smooth: its derivatives are computed from its values within
+            2e-4 s before and after a time (4e-4 s after it at the start, never before time 0). For gradients with
+            respect to the path, give center and rotation over time among the values of ms.simulate instead.
 
     `_core` is the shape in the C++ core; `_made_from` has the arguments from which a copy or another process makes it.
     """
