@@ -270,3 +270,18 @@ def test_missing_scale_and_gradient_are_refused():
         ms.optim.MMA([x], lower=0.6, upper=1.0).step(lambda: x.sum())
     with pytest.raises(AttributeError, match="Adam"):
         ms.optim.Adam  # noqa: B018
+
+
+@pytest.mark.parametrize("satisfiable", [True, False])
+def test_the_dual_of_an_only_constraint_agrees_with_the_interior_point(rng, satisfiable):
+    for n in (3, 40):
+        s = rng.uniform(0.05, 1.0, n)
+        slopes = rng.standard_normal((2, n))
+        up, down = np.maximum(slopes, 0.0), np.maximum(-slopes, 0.0)
+        p, q = s**2 * (1.001 * up + 0.001 * down + 1e-3), s**2 * (0.001 * up + 1.001 * down + 1e-3)
+        bounds = -0.9 * s * rng.uniform(0.1, 1.0, n), 0.9 * s * rng.uniform(0.1, 1.0, n)
+        # at t = 0 the constraint is met by a little, or broken by more than the bounds allow
+        limits = ((p + q) @ (1.0 / s))[1:] + (0.01 * n if satisfiable else -10.0 * n)
+        for limit in (limits, limits - 0.1 * n):
+            sub = Subproblem(p, q, limit, s, *bounds, 1000.0)
+            assert sub.solve() == pytest.approx(sub._interior_point(), rel=0.0, abs=1e-5)
