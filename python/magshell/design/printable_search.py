@@ -23,17 +23,11 @@ from .printed_faces import PrintedFaces
 from .tabu_search import Exchanges
 
 _LINE_SEARCH = 8  # evaluations per line search: few, so that a stage does not end at a kink of the objective
-_SAME_OBJECTIVE = (
-    1e-6  # [-] relative difference that counts as equal: thread count or release may change rounding
-)
+# [-] Relative difference of objectives that counts as equal: other numbers of threads and releases round differently.
+_SAME_OBJECTIVE = 1e-6
 _ROUNDING = 1e-12  # [-] difference relative to the largest objective so far that counts as round-off
-_STORED = (
-    "evaluations",
-    "at_once",
-    "rounded",
-    "scale",
-    "_compared",
-)  # attributes in a checkpoint, with design and stages
+# Attributes that a checkpoint stores beside the design and the stages.
+_STORED = ("evaluations", "objective_rounded_at_once", "rounded", "scale", "_compared")
 
 
 class Stopped(Exception):
@@ -41,7 +35,9 @@ class Stopped(Exception):
 
 
 class PrintableSearch:
-    """A search: its faces, and the stages so far, which determine the next one, so that it can continue from a file."""
+    """A search for a printable magnetization. Its faces and the stages so far determine the next stage, so that it can
+    continue from a file.
+    """
 
     def __init__(
         self,
@@ -69,11 +65,12 @@ class PrintableSearch:
         self.history: list[PrintableStage] = []
         self.evaluations: int = 0
         self.began: float = time.perf_counter()
-        self.at_once: float | None = None  # objective of the free design with all faces rounded at once
+        # The free design with all faces rounded at once, and its objective; None if it cannot be evaluated.
+        self.objective_rounded_at_once: float | None = None
         self.rounded: tuple[Any, ...] = ()
         self.scale: float = 0.0  # factor of the penalty, in units of the objective
         self._compared = False  # whether the design was compared with the one rounded at once
-        self._exchanges: Exchanges | None = None  # while they go on
+        self._exchanges: Exchanges | None = None  # the exchanges of faces, if they have begun
         self._reported = 0  # number of stages that the callback has been called with
 
     def run(self, exchanges: int) -> str:
@@ -93,26 +90,30 @@ class PrintableSearch:
         return sum(stage.name == name for stage in self.history)
 
     def free(self) -> None:
-        """Run the first stage, with any magnetization, and set the scale of the penalty by the loss of rounding all
-        at once."""
+        """Run the first stage, with any magnetization, and set the scale of the penalty from the loss by rounding all faces
+        at once.
+        """
         self.relax("free", 0.0, self._max_iterations)
         free, value, distance = self.snapshot(), self.history[-1].objective, self.history[-1].distance
         self.faces.freeze_nearest(np.arange(len(self.faces.held)))
         try:
-            self.at_once = self.value()
+            self.objective_rounded_at_once = self.value()
             self.rounded = self.snapshot()
         except DesignRejected as error:
             log.info("minimize_printable: rounded at once, the design cannot be evaluated: %s", error)
         finally:
             self.back_to(free)
-        loss = abs(value) if self.at_once is None else max(self.at_once - value, 0.0)
+        loss = (
+            abs(value)
+            if self.objective_rounded_at_once is None
+            else max(self.objective_rounded_at_once - value, 0.0)
+        )
         self.scale = loss / distance if distance > 0.0 else 0.0
 
     def round(self) -> None:
-        """Freeze all faces in blocks, each a fixed fraction of those that are left, so that the last has about one
-        face.
+        """Freeze all faces in blocks. Each is a fixed fraction of the free faces, such that the last has about one face.
 
-        Then take the design that was rounded at once, if it is lower.
+        Then take the design that was rounded at once, if its objective is lower.
         """
         held = self.faces.held
         fraction = 1.0 if self._blocks == 1 else 1.0 - len(held) ** (-1.0 / (self._blocks - 1))
@@ -126,15 +127,18 @@ class PrintableSearch:
                 self.freeze(self.faces.nearest_to_printable(size))
                 self.relax("hold", 0.0)
             except BaseException:
-                if len(self.history) == before[1]:  # return the design that the last stage ended with
+                if len(self.history) == before[1]:  # restore the design at the end of the last stage
                     self.faces.restore(before[0])
                 raise
             self._save()
         if not self._compared:
             self._compared = True
-            if self.at_once is not None and self.at_once < self.history[-1].objective:
+            if (
+                self.objective_rounded_at_once is not None
+                and self.objective_rounded_at_once < self.history[-1].objective
+            ):
                 self.back_to(self.rounded)
-                self.end("hold", self.at_once)
+                self.end("hold", self.objective_rounded_at_once)
             self._save()
 
     def freeze(self, faces: np.ndarray) -> None:
@@ -203,8 +207,9 @@ class PrintableSearch:
         self.bar.update(len(history) + (0 if exchanges is None else exchanges.trial))
 
     def _check(self, was: float, largest: float, fresh: tuple[Any, ...]) -> None:
-        """Raise ValueError if the objective of the checkpoint's design has changed, after a return to the design
-        `fresh`."""
+        """Raise ValueError if the objective of the checkpoint's design is not the stored one; restore the design `fresh`
+        before.
+        """
         try:
             now = self.value()
         except DesignRejected as error:  # its equilibrium was reached along another path, which is not stored
@@ -244,8 +249,7 @@ class PrintableSearch:
         return time.perf_counter() - self.began
 
     def snapshot(self) -> tuple[Any, ...]:
-        """Return the design with the states of the stateful objects: an equilibrium may not be reached again without
-        them."""
+        """Return the design and the states of the stateful objects, without which its equilibrium may not be found again."""
         return self.faces.snapshot(), [copy.deepcopy(each.state_dict()) for each in self.stateful]
 
     def back_to(self, snapshot: tuple[Any, ...]) -> None:
@@ -295,7 +299,7 @@ class PrintableSearch:
                 self.note(name, weight, found.objective - penalty * left)
 
     def note(self, name: str, weight: float, value: float) -> None:
-        """Append a stage that is over, or was cut short, to the history, and show it."""
+        """Append a stage that has ended, or was interrupted, to the history, and show it."""
         stage = PrintableStage(
             name,
             weight,
@@ -314,7 +318,7 @@ class PrintableSearch:
         )
 
     def evaluate(self, magnetization: Any) -> Any:
-        """Return the objective as a tensor. Raises ValueError if it comes with constraints."""
+        """Return the objective as a tensor. Raises ValueError if the user's function returns constraints too."""
         self.evaluations += 1
         answer = Answer.of(self.objective(magnetization))
         if answer.constraints is not None:
@@ -325,7 +329,7 @@ class PrintableSearch:
 
     def value(self) -> float:
         """Return the objective of the current design."""
-        from .optim.sample import Trial  # late, as torch is
+        from .optim.sample import Trial  # imports torch
 
         torch = require_torch("minimize_printable")
         return Trial(lambda: self.evaluate(torch.from_numpy(self.faces.magnetization)), []).objective
@@ -351,13 +355,13 @@ class PrintableSearch:
             torch.from_numpy(self.faces.magnetization),
             self.history[-1].objective,
             self.history[0].objective,
-            self.at_once,
+            self.objective_rounded_at_once,
             self.history,
             reason,
         )
 
 
 def _optimizer(components, lower, upper):
-    from .optim import LBFGS  # late, as torch is
+    from .optim import LBFGS  # imports torch
 
     return LBFGS([components], lower=lower, upper=upper, max_evaluations=_LINE_SEARCH)

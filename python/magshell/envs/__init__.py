@@ -18,7 +18,7 @@ Robots that come along are registered once their module is loaded, which gymnasi
 `gymnasium.make("magshell.envs.robots:magshell/MagneticStrip-v0")`. `VectorEnv` steps many of them at once over threads,
 `gymnasium.make_vec` in processes; whole episodes run in the processes of any executor by `episodes`.
 
-gymnasium (the extra `gym`) is imported when `Environment`, `VectorEnv` or `robots` is first asked for.
+gymnasium (the extra `gym`) is imported when `Environment`, `VectorEnv` or `robots` is first used.
 """
 
 from __future__ import annotations

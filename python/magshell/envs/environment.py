@@ -51,14 +51,14 @@ class Environment(gymnasium.Env):
 
     actuators: the values that an action sets, Action or ParametricAction objects. The action holds their numbers one after
         another, each from -1 to 1.
-    observation: function of a Snapshot, the state after an action: finite numbers, always as many, in any one shape.
-    reward: function of a Snapshot: a number. `snapshot.before` is the state that the action began in.
-    time_step: s. steps_per_action: number of time steps that an action lasts. actions_per_episode: after so many actions
-        an episode is truncated.
-    start: function of numpy's Generator, which the seed of `reset` sets: the disturbance that an episode begins with, as
-        {"start": ..., "velocities": ...} of ms.simulate, either or both. By default it begins at rest.
-        `reset(options=...)` takes the same names, which come first.
-    finished: function of a Snapshot: whether the episode ends there.
+    observation: function of a Snapshot, the state after an action. It returns finite numbers, always in the same shape.
+    reward: function of a Snapshot that returns a number. `snapshot.before` is the state in which the action began.
+    time_step: s. steps_per_action: number of time steps of an action. actions_per_episode: number of actions after which an
+        episode is truncated.
+    start: function of numpy's Generator, which the seed of `reset` sets. It returns the disturbance with which an episode
+        begins, {"start": ..., "velocities": ...} as in ms.simulate, either or both. By default it begins at rest.
+        `reset(options=...)` takes the same names, and has precedence.
+    finished: function of a Snapshot that returns whether the episode ends there.
     failure_reward: if a step of the motion fails, the episode ends with this reward, at the last good state, and
         info["failure"] says why. None: ms.NotConverged is raised.
     simulate: {name: value}, further arguments of ms.simulate: integrator, damping, solver, ...
@@ -160,7 +160,7 @@ class Environment(gymnasium.Env):
         self._bounds = Bounds(observation_bounds, clip, dtype)
         self.render_mode: str | None = render_mode
         self._width, self._view = checked_width(render_width), view
-        view_of(states_of(scene), view)  # raises, before there is anything to see
+        view_of(states_of(scene), view)  # raises now for a wrong view, not at the first frame
         self._style = style_of(style)
         if self._style.contacts:
             raise ValueError(
@@ -254,8 +254,8 @@ class Environment(gymnasium.Env):
         functions of the environment compute them from tensors: they must use torch, or operations that tensors and arrays
         share, such as `now.positions[tip, 2].mean()` and lists of such numbers.
 
-        The episode of the environment itself is not changed, no episode ends here, and `finished` is not asked. By
-        ImplicitEuler() a step has the bits of `step`. Raises NotConverged if a step of the motion fails, NoGradient if
+        The episode of the environment itself does not change, no episode ends here, and `finished` is not called. With
+        ImplicitEuler() a step has the same bits as `step`. Raises NotConverged if a step of the motion fails, NoGradient if
         the functions leave torch.
         """
         if not isinstance(state, EnvState):
@@ -311,15 +311,14 @@ class Environment(gymnasium.Env):
             self._window = None
 
     def _copied(self) -> Environment:
-        """Return an environment of its own core model, which shares meshes, objects and functions with this one."""
+        """Return an environment with a core model of its own, which shares meshes, objects and functions with this one."""
         other = copy.copy(self)
         other.scene = copy.copy(self.scene)
         other._now = other._camera = other._window = other._np_random = None
         return other
 
     def _begin(self, where: dict[Any, Any]) -> None:
-        """Compute the state that an episode begins in: the first state of a motion of one step, whose end is not
-        used."""
+        """Compute the first state of an episode. It is the start of a motion of one step, whose end is not used."""
         for name in where:
             if name not in ("start", "velocities"):
                 raise ValueError(f'an episode begins with "start" and "velocities", got {name!r}')

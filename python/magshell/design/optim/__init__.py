@@ -1,7 +1,7 @@
 """Optimizers for designs, as torch optimizers with closures: `MMA`, `GCMMA`, `LBFGS`, `GaussNewton` and
 `NewtonCG`.
 
-torch is imported when one of them is first asked for.
+torch is imported when one of them is first used.
 """
 
 from __future__ import annotations

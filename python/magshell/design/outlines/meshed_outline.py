@@ -29,15 +29,14 @@ if TYPE_CHECKING:
 
     from ..._input.kinds import Numbers
 
-_MOST_MESHES = (
-    20  # on the way between two designs; see test_designs_far_apart_are_reached_over_several_meshes
-)
-# [-] Largest stretch of faces over which values are transferred from one mesh to the next, in units of most_stretch
-_MOST_AT_ONCE = 2.0
-_ON_CURVE = 1e-6  # [-] largest distance, by round-off, of a vertex on a curve from it, over the size of faces
-# Smallest angle [rad] of a new mesh; see test_borders_that_nearly_touch_are_rejected.
-_SHARPEST = np.radians(3.0)
-# The attributes that follow from the current mesh
+# Largest number of meshes between two designs; see test_designs_far_apart_are_reached_over_several_meshes.
+_MAX_MESHES = 20
+# [-] Largest stretch of faces over which values are transferred from one mesh to the next, in units of most_stretch.
+_MAX_TRANSFER_STRETCH = 2.0
+_ON_CURVE = 1e-6  # [-] distance of a vertex from its curve that counts as round-off, over the size of faces
+# [rad] Smallest angle of a new mesh; see test_borders_that_nearly_touch_are_rejected.
+_MIN_ANGLE = np.radians(3.0)
+# Attributes that are computed from the current mesh.
 _OF_MESH = (
     "mesh",
     "n_meshes",
@@ -67,9 +66,9 @@ class MeshedOutline(Frozen):
 
     Attributes:
         mesh: the current TriangleMesh, as it was made, with the groups "border 0", "border 0 side 2", "slit 0", ....
-        first_mesh: that at the start, on whose faces and vertices values of the design are given.
+        first_mesh: the mesh at the start, on whose faces and vertices values of the design are given.
         n_meshes: the number of meshes made so far.
-        reference_positions: (n_v, 3) m, where the material at the vertices of `mesh` was in `first_mesh`.
+        reference_positions: (n_v, 3) m, the places in `first_mesh` of the material at the vertices of `mesh`.
 
     Raises ValueError for curves that cross or touch, which it names, for circles smaller than a face, and slits that do not
     open; ImportError without gmsh.
@@ -129,7 +128,7 @@ class MeshedOutline(Frozen):
     def controls(self) -> list[torch.Tensor]:
         """Return the control numbers of the start as new tensors that require a gradient, borders before slits.
 
-        Of polygons, splines and slits they are (k, 2) m, of circles (3,) m, the center and the radius.
+        Polygons, splines and slits have (k, 2) m; circles have (3,) m, the center and the radius.
         """
         torch = require_torch("MeshedOutline.controls")
         return [torch.tensor(border.start, requires_grad=True) for border in self._borders]
@@ -175,8 +174,8 @@ class MeshedOutline(Frozen):
     def from_last_mesh(self, values: Numbers) -> np.ndarray:
         """Return values at the vertices of the mesh before the last one, (n, ...), at the vertices of `mesh`.
 
-        The mesh before is that which the last call of `positions` that meshed anew began with.
-        Displacements on one mesh start a solve on the next:
+        The mesh before is the one with which the last call of `positions` that made a new mesh began. Displacements on one
+        mesh can start a solve on the next:
         `start=rest_positions.detach().numpy() + outline.from_last_mesh(displacements)`.
         """
         matrix = self._of_vertices
@@ -188,7 +187,7 @@ class MeshedOutline(Frozen):
         return (matrix @ array.reshape(len(array), -1)).reshape(-1, *array.shape[1:])
 
     def state_dict(self) -> dict[str, Any]:
-        """Return what an equal MeshedOutline needs to go on with the current mesh: arrays and plain values."""
+        """Return the state from which an equal MeshedOutline continues with the current mesh: arrays and plain values."""
         matrix = self._of_vertices
         parts = None if matrix is None else [matrix.data, matrix.indices, matrix.indptr, list(matrix.shape)]
         return {
@@ -253,7 +252,7 @@ class MeshedOutline(Frozen):
         except ValueError as error:
             raise DesignRejected(f"the outline cannot be meshed: {error}") from error
         sharpest = mesh.quality.smallest_angles
-        if sharpest.min() < _SHARPEST:
+        if sharpest.min() < _MIN_ANGLE:
             x, y, _ = mesh.face_barycenters[sharpest.argmin()]
             raise DesignRejected(
                 f"the outline needs a face with an angle of {np.degrees(sharpest.min()):.2g} degrees at "
@@ -284,10 +283,10 @@ class MeshedOutline(Frozen):
         number_of_mesh: int,
         of_vertices: Any = None,
     ) -> None:
-        """Make a mesh the current one, with what maps control numbers and values of the design to it.
+        """Make a mesh the current one, with the matrices that map control numbers and values of the design to it.
 
-        controls: at which it was made. reference: (n_v, 3) m. of_vertices: matrix that interpolates values at the vertices
-        of the mesh before.
+        controls: the control numbers at which it was made. reference: `reference_positions`. of_vertices: the matrix that
+        interpolates values from the vertices of the mesh before.
         """
         curves = self._curves_at(controls)
         border = mesh.rest_positions[mesh.boundary_vertices][:, :2]
@@ -333,25 +332,25 @@ class MeshedOutline(Frozen):
         return float(max(stretches.max(), 1.0 / stretches.min()))
 
     def _remesh(self, controls: np.ndarray) -> None:
-        """Make a new mesh at these control numbers, over others on the way if the current one cannot be stretched so far."""
+        """Make a new mesh at these control numbers, with meshes in between if the current one cannot be stretched so far."""
         kept = {name: getattr(self, name) for name in _OF_MESH}
         total, reached = None, None
         try:
-            for _ in range(_MOST_MESHES):
+            for _ in range(_MAX_MESHES):
                 reached = controls
-                while self._stretch(reached) > _MOST_AT_ONCE * self.most_stretch:
+                while self._stretch(reached) > _MAX_TRANSFER_STRETCH * self.most_stretch:
                     reached = 0.5 * (self._at + reached)
-                worn = self._positions_at(reached)
+                stretched = self._positions_at(reached)
                 mesh = self._made(reached)
-                step = between_vertices(FaceLocator(worn[:, :2], self.mesh.faces), mesh)
+                step = between_vertices(FaceLocator(stretched[:, :2], self.mesh.faces), mesh)
                 total = step if total is None else step @ total
-                before = self.mesh._with_rest_positions(worn)
+                before = self.mesh._with_rest_positions(stretched)
                 self._take(mesh, reached, step @ self.reference_positions, self.n_meshes + 1, total)
                 if reached is controls:
                     break
             else:
                 raise DesignRejected(
-                    f"the outline is too far from the last one: {_MOST_MESHES} meshes in between do not lead to it"
+                    f"the outline is too far from the last one: {_MAX_MESHES} meshes in between do not lead to it"
                 )
         except BaseException:
             remember(self, **kept)

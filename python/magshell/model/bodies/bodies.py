@@ -29,7 +29,7 @@ BODIES = (Shell, Solid)
 class Bodies:
     """The bodies of a scene, and the numbers of their vertices, edges and faces among those of all.
 
-    shells: all Shells and Solids. rigid: the rigid bodies, links among them, whose points come after all vertices.
+    deformable: all Shells and Solids. rigid: the rigid bodies, including links, whose points come after all vertices.
     with_surface_nodes: rigid bodies whose shapes have nodes of their own, after the points of all (`add_surface_nodes`).
     original: (n_v of all,), the first of the vertices that each is welded to, or itself.
 
@@ -45,7 +45,9 @@ class Bodies:
         listed = checked_list("bodies", bodies, (*BODIES, RigidBody, Skeleton), repeats=True)
         self.skeletons: tuple[Skeleton, ...] = tuple(body for body in listed if isinstance(body, Skeleton))
         self.listed: tuple[Any, ...] = tuple(listed)
-        self.shells: tuple[Shell | Solid, ...] = tuple(body for body in listed if isinstance(body, BODIES))
+        self.deformable: tuple[Shell | Solid, ...] = tuple(
+            body for body in listed if isinstance(body, BODIES)
+        )
         self.rigid: tuple[RigidBody, ...] = tuple(
             part for body in listed for part in _parts(body) if isinstance(part, RigidBody)
         )
@@ -56,20 +58,18 @@ class Bodies:
                 raise ValueError(
                     f"bodies must differ, but rigid parts {self.rigid_number(part)} and {k} are one RigidBody"
                 )
-        for k, shell in enumerate(self.shells):
-            if (before := self.number(shell)) < k:
+        for k, body in enumerate(self.deformable):
+            if (before := self.number(body)) < k:
                 raise ValueError(
-                    f"bodies must differ, but bodies {before} and {k} are one {type(shell).__name__}: make another of "
+                    f"bodies must differ, but bodies {before} and {k} are one {type(body).__name__}: make another of "
                     "its mesh"
                 )
         self.spans: list[Span] = []
-        rotation = dict(zip(map(id, self.sheets), self._first_rotations(), strict=True))
+        rotation = dict(zip(map(id, self.shells), self._first_rotations(), strict=True))
         vertex = edge = face = row = 0
-        for k, shell in enumerate(self.shells):
-            mesh = shell.mesh
-            self.spans.append(
-                Span(mesh, slice(k, k + 1), vertex, edge, face, rotation.get(id(shell), 0), row)
-            )
+        for k, body in enumerate(self.deformable):
+            mesh = body.mesh
+            self.spans.append(Span(mesh, slice(k, k + 1), vertex, edge, face, rotation.get(id(body), 0), row))
             vertex, edge, face = vertex + mesh.n_vertices, edge + turning_edges(mesh), face + mesh.n_faces
             row += magnetized_rows(mesh)
         self.ties: tuple[Tie, ...] = checked_list("ties", ties, (Tie,))
@@ -78,8 +78,8 @@ class Bodies:
         self._check_welded_once()
 
     def _first_rotations(self) -> list[int]:
-        """Return the number of the first edge rotation of each of `sheets`."""
-        return np.cumsum([0, *(rotations_of(sheet.mesh) for sheet in self.sheets)])[:-1].tolist()
+        """Return the number of the first edge rotation of each of `shells`."""
+        return np.cumsum([0, *(rotations_of(shell.mesh) for shell in self.shells)])[:-1].tolist()
 
     def _pairs(self, tie: Tie) -> np.ndarray:
         """Return the vertices of the scene that a tie welds, (k, 2)."""
@@ -125,20 +125,20 @@ class Bodies:
             )
 
     def __len__(self) -> int:
-        return len(self.shells)
+        return len(self.deformable)
 
     @property
     def meshes(self) -> list[TriangleMesh]:
-        return [shell.mesh for shell in self.shells]
+        return [body.mesh for body in self.deformable]
 
     @cached_property
     def mesh(self) -> TriangleMesh:
         """The mesh of all bodies. Its edges, sorted by their lower vertex, are those of one body after another, too."""
         if len(self) == 1:
-            return self.shells[0].mesh
-        if not self.shells:
+            return self.deformable[0].mesh
+        if not self.deformable:
             return NoMesh()
-        if not self.flat_sheets_alone:
+        if not self.has_only_three_node_shells:
             return JoinedMesh(self.meshes)
         faces = [span.mesh.faces + span.first_vertex for span in self.spans]
         return TriangleMesh(
@@ -179,26 +179,26 @@ class Bodies:
         return skeleton is not None and skeleton._is_grounded(part)
 
     @property
-    def sheets(self) -> tuple[Shell, ...]:
+    def shells(self) -> tuple[Shell, ...]:
         """The shells in the core's order: those of six-node elements come last."""
-        return (*self.flat_sheets, *self.six_node_sheets)
+        return (*self.three_node_shells, *self.six_node_shells)
 
     @property
-    def flat_sheets(self) -> tuple[Shell, ...]:
-        return tuple(body for body in self.shells if isinstance(body.mesh, TriangleMesh))
+    def three_node_shells(self) -> tuple[Shell, ...]:
+        return tuple(body for body in self.deformable if isinstance(body.mesh, TriangleMesh))
 
     @property
-    def six_node_sheets(self) -> tuple[Shell, ...]:
-        return tuple(body for body in self.shells if isinstance(body.mesh, QuadraticTriangleMesh))
+    def six_node_shells(self) -> tuple[Shell, ...]:
+        return tuple(body for body in self.deformable if isinstance(body.mesh, QuadraticTriangleMesh))
 
     @property
-    def flat_sheets_alone(self) -> bool:
-        """Return whether all bodies are sheets of three-node faces."""
-        return len(self.flat_sheets) == len(self.shells)
+    def has_only_three_node_shells(self) -> bool:
+        """Return whether all deformable bodies are shells of three-node faces."""
+        return len(self.three_node_shells) == len(self.deformable)
 
     @property
     def n_rotations(self) -> int:
-        """The number of edge rotations of all sheets."""
+        """The number of edge rotations of all shells."""
         return sum(rotations_of(mesh) for mesh in self.meshes)
 
     @property
@@ -208,7 +208,7 @@ class Bodies:
 
     @property
     def solids(self) -> tuple[Solid, ...]:
-        return tuple(body for body in self.shells if isinstance(body, Solid))
+        return tuple(body for body in self.deformable if isinstance(body, Solid))
 
     @property
     def skins(self) -> tuple[Skin, ...]:
@@ -225,14 +225,12 @@ class Bodies:
         """The longest side of a bounding box among all bodies, m."""
         return max((float(np.ptp(mesh.rest_positions, axis=0).max()) for mesh in self.meshes), default=0.0)
 
-    def number(self, shell: Shell | Solid) -> int:
+    def number(self, body: Shell | Solid) -> int:
         """Return the number of a shell or solid. Raises ValueError if it is not in the scene."""
-        for k, each in enumerate(self.shells):
-            if each is shell:
+        for k, each in enumerate(self.deformable):
+            if each is body:
                 return k
-        what = (
-            f"a {type(shell).__name__} that is not in it" if isinstance(shell, BODIES) else f"{shell!r:.60}"
-        )
+        what = f"a {type(body).__name__} that is not in it" if isinstance(body, BODIES) else f"{body!r:.60}"
         raise ValueError(f"a body of the scene is one of scene.bodies, got {what}")
 
     def rigid_number(self, part: RigidBody) -> int:
@@ -295,46 +293,48 @@ class Bodies:
             raise ValueError(f"a {kind} is about a body that is not in the scene: {item.body!r}") from None
 
     def split(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the body of each of the scene's edges, (k,), and the number of the edge in that body, (k,)."""
+        """Return the number of the body of each of these edges of the scene, (k,), and the number of the edge in that
+        body, (k,).
+        """
         first = np.array([span.first_edge for span in self.spans])
         of = np.searchsorted(first, edges, side="right") - 1
         return of, edges - first[of]
 
     def core_number(self, span: Span, n_skins: int = 0) -> int:
-        """Return the core's number of a body: flat sheets come first, then solids, then `n_skins` skins, then six-node
-        sheets.
+        """Return the core's number of a body: three-node shells come first, then solids, then `n_skins` skins, then six-node
+        shells.
         """
-        body = self.shells[span.bodies.start or 0]
+        body = self.deformable[span.bodies.start or 0]
         before = 0
-        for kind, others in ((self.flat_sheets, 0), (self.solids, n_skins), (self.six_node_sheets, 0)):
+        for kind, others in ((self.three_node_shells, 0), (self.solids, n_skins), (self.six_node_shells, 0)):
             for k, each in enumerate(kind):
                 if each is body:
                     return before + k
             before += len(kind) + others
         raise ValueError("a body of the scene is one of scene.bodies")
 
-    def sheets_before(self, body: Shell | Solid) -> tuple[Shell, ...]:
-        """Return the sheets before a body, in arrays that have rows for sheets only."""
-        return tuple(takewhile(lambda each: each is not body, self.sheets))
+    def shells_before(self, body: Shell | Solid) -> tuple[Shell, ...]:
+        """Return the shells before a body, for arrays that have rows for shells only."""
+        return tuple(takewhile(lambda each: each is not body, self.shells))
 
-    def sheets_of(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the same as `split`, with the number of the body among `sheets`; -1 for a solid."""
+    def shells_of(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the same as `split`, with the number of the body among `shells`; -1 for a solid."""
         of, own = self.split(edges)
-        numbers = {id(sheet): k for k, sheet in enumerate(self.sheets)}
-        return np.array([numbers.get(id(body), -1) for body in self.shells], dtype=int)[of], own
+        numbers = {id(shell): k for k, shell in enumerate(self.shells)}
+        return np.array([numbers.get(id(body), -1) for body in self.deformable], dtype=int)[of], own
 
 
 def _parts(body) -> tuple[Any, ...]:
     return body.links if isinstance(body, Skeleton) else (body,)
 
 
-class CombinedSheets:
-    """The face values of several sheets, or of none, one sheet after another."""
+class CombinedShells:
+    """The face values of several shells, or of none, one shell after another."""
 
-    def __init__(self, mesh: TriangleMesh, sheets: tuple[Shell, ...]):
+    def __init__(self, mesh: TriangleMesh, shells: tuple[Shell, ...]):
         self.mesh = mesh
-        self.thickness: np.ndarray = joined([sheet._face_thickness for sheet in sheets] or [np.zeros(0)])
-        self.young_modulus: np.ndarray = joined([sheet.young_modulus for sheet in sheets] or [np.zeros(0)])
+        self.thickness: np.ndarray = joined([shell._face_thickness for shell in shells] or [np.zeros(0)])
+        self.young_modulus: np.ndarray = joined([shell.young_modulus for shell in shells] or [np.zeros(0)])
 
     @cached_property
     def quality(self) -> MeshQuality:

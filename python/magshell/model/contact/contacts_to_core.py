@@ -272,7 +272,7 @@ def check_outside(scene: Scene, values: Any, points: np.ndarray, time: float) ->
         return
     positions, own = points[: scene.mesh.n_vertices], points[scene.mesh.n_vertices :]
     allowed = np.empty(scene.mesh.n_vertices)
-    for span, sheet in zip(scene._bodies.spans, values.sheets, strict=True):
+    for span, sheet in zip(scene._bodies.spans, values.deformable, strict=True):
         solid = isinstance(sheet, Solid)
         allowed[span.vertices] = 0.01 * sheet.mesh.size if solid else 0.5 * np.max(sheet.thickness)
     for contact in scene._obstacle_contacts:

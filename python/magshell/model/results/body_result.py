@@ -26,7 +26,7 @@ class BodyResult(Frozen):
     def __init__(self, result: SolveResult, body: Shell):
         bodies = result.scene._bodies
         self._result, self._span = result, bodies.spans[bodies.number(body)]
-        self._first_row = sum(sheet.mesh.n_faces for sheet in bodies.sheets_before(body))
+        self._first_row = sum(sheet.mesh.n_faces for sheet in bodies.shells_before(body))
         self.body = body
 
     @property

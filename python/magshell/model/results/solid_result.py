@@ -52,7 +52,7 @@ class SolidResult(BodyResult):
 def describe_strains(result: SolveResult, of_sheets: str) -> str:
     """Return lines of a repr on the last state: one for all sheets and one per solid. of_sheets: the line for the sheets."""
     bodies = result.scene._bodies
-    lines = [str(of_sheets)] if bodies.sheets or not bodies.solids else []
+    lines = [str(of_sheets)] if bodies.shells or not bodies.solids else []
     last = "" if np.ndim(result.positions) == 2 else ", in the last state"
     for solid in bodies.solids:
         name = f"body {bodies.number(solid)}" if len(bodies) > 1 else "solid"

@@ -132,7 +132,7 @@ def _vertices(part: RigidBody, bodies) -> np.ndarray:
     """
     if part.vertices is None:
         return np.zeros(0, dtype=np.int64)
-    if not bodies.shells:
+    if not bodies.deformable:
         raise ValueError(
             "a RigidBody with vertices needs the Shell or Solid whose vertices they are among the bodies"
         )

@@ -106,8 +106,8 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
             raise ValueError(f"own_field names a {type(body).__name__} without a magnetic_moment")
     bodies = scene._bodies
     return {
-        "own_field_shells": _numbers(bodies.flat_sheets, chosen),
-        "own_field_six_node_shells": _numbers(bodies.six_node_sheets, chosen),
+        "own_field_shells": _numbers(bodies.three_node_shells, chosen),
+        "own_field_six_node_shells": _numbers(bodies.six_node_shells, chosen),
         "own_field_solids": _numbers(
             bodies.solids, [each for each in chosen if _is_magnetized_throughout(each)]
         ),

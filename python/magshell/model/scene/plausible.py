@@ -36,8 +36,8 @@ MOST_FLUX_DENSITY = 30.0  # T: what moves soft robots has 0.1, the strongest mag
 
 def warn_of_units(scene: Scene, values: Values) -> None:
     """Warn of bodies whose size, stiffness, density or magnetization is absurd; once per scene and kind of value."""
-    for k, body in enumerate(values.sheets):
-        whose = f" of body {k}" if len(values.sheets) > 1 else ""
+    for k, body in enumerate(values.deformable):
+        whose = f" of body {k}" if len(values.deformable) > 1 else ""
         if isinstance(body, Shell):
             _warn_of_thickness(scene, body, whose)
             _warn_of_susceptibility(scene, body, whose)

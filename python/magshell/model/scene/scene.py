@@ -255,7 +255,7 @@ class Scene(PlotMixin):
             tied=[each._asdict() for each in constraints.tied],
             moves=len(constraints.moves),
             couples=np.stack(
-                [*bodies.sheets_of(edges), n_directions - n_moments + np.arange(n_moments)], axis=1
+                [*bodies.shells_of(edges), n_directions - n_moments + np.arange(n_moments)], axis=1
             ).astype(np.int32),
             gravity=bool(self.gravity.any()),
             **face_inputs(self),
@@ -333,12 +333,12 @@ class Scene(PlotMixin):
 
     @cached_property
     def _obtuse_faces(self) -> ObtuseFaces:
-        return ObtuseFaces(self._values.all_sheets, self._model.recut_faces)
+        return ObtuseFaces(self._values.all_shells, self._model.recut_faces)
 
     @property
     def bodies(self) -> tuple[Shell | Solid, ...]:
         """The shells and solids, in the order of their vertices."""
-        return self._bodies.shells
+        return self._bodies.deformable
 
     @property
     def ties(self) -> tuple[Tie, ...]:
@@ -348,7 +348,7 @@ class Scene(PlotMixin):
     @property
     def creases(self) -> tuple[Crease, ...]:
         """The creases of all shells."""
-        return tuple(crease for sheet in self._bodies.sheets for crease in sheet.creases)
+        return tuple(crease for sheet in self._bodies.shells for crease in sheet.creases)
 
     @property
     def rigid_parts(self) -> tuple[RigidBody, ...]:
@@ -410,7 +410,7 @@ class Scene(PlotMixin):
     @property
     def has_susceptible_shells(self) -> bool:
         """Return whether a shell has a susceptibility, so that forces are quadratic in the applied field."""
-        return any(sheet.susceptibility is not None for sheet in self._bodies.sheets)
+        return any(sheet.susceptibility is not None for sheet in self._bodies.shells)
 
     @property
     def n_dofs(self) -> int:

@@ -67,7 +67,7 @@ def body_inputs(scene: Scene, directed_edges: np.ndarray) -> dict[str, list[dict
 
 def muscle_inputs(scene: Scene) -> list[dict[Any, Any]]:
     bodies = scene._bodies
-    first = len(bodies.flat_sheets)
+    first = len(bodies.three_node_shells)
     return [
         muscle._core_input(label, bodies.core_number(bodies.of(muscle)) - first)
         for muscle, label in scene._labels
@@ -124,7 +124,7 @@ def crease_inputs(scene: Scene) -> list[dict[Any, Any]]:
     labels, bodies = {id(each): label for each, label in scene._labels}, scene._bodies
     return [
         crease._core_input(labels[id(crease)], span.mesh, bodies.original[span.vertices])
-        for body, span in zip(bodies.shells, bodies.spans, strict=True)
+        for body, span in zip(bodies.deformable, bodies.spans, strict=True)
         if isinstance(body, Shell)
         for crease in body.creases
     ]

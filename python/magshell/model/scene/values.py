@@ -13,7 +13,7 @@ import numpy as np
 from ..._input.quantity import quantity
 from ..._input.tensor_kinds import why_not
 from ..._runtime.frozen import variant
-from ..bodies.bodies import CombinedSheets, joined
+from ..bodies.bodies import CombinedShells, joined
 from ..shells.shell import Shell
 from ..supports.constraints import Constraints, gather
 from .magnetization import gradient_by_all, magnetization_rows
@@ -35,7 +35,7 @@ class Values:
 
     replaced: {object of the scene: {name: array}}; the scene itself has the names "gravity" and "vertex_loads".
     magnetization: (n_f of all, 3) A/m, in place of the bodies' own; only for a scene in a field.
-    sampling_of: values whose faces that sample the field finely (fine_faces.py) these have too; without it there are none.
+    sampling_of: values to copy from which faces sample the field finely (fine_faces.py); without it none do.
 
     The attribute `replaced` is a copy of what was given; `numbers`, (n,), holds all values in the order of the core.
     Raises ValueError if a value does not fit its object.
@@ -60,7 +60,7 @@ class Values:
         for body in scene._bodies.solids:
             if body.skin in self._now:
                 self._now[body] = variant(self.current(body), skin=self._now[body.skin])
-        self.sheets: tuple[Any, ...] = tuple(self.current(body) for body in scene.bodies)
+        self.deformable: tuple[Any, ...] = tuple(self.current(body) for body in scene.bodies)
         self.rigid: tuple[Any, ...] = tuple(self.current(span) for span in scene.rigid_parts)
         self.constraints: Constraints = scene._constraints
         if any(support in self._now for support in scene.supports):
@@ -103,7 +103,7 @@ class Values:
         """Hold the core as `in_core` does, but only if a sheet can grow: strains are then measured from the grown
         shape.
         """
-        if any(self.current(body)._in_time for body in self.scene._bodies.sheets):
+        if any(self.current(body)._in_time for body in self.scene._bodies.shells):
             with self.in_core():
                 yield
         else:
@@ -142,38 +142,38 @@ class Values:
         return [(self.current(each), label, self.contact_bodies(each)) for each, label in labels]
 
     @property
-    def all_sheets(self) -> Shell | CombinedSheets:
-        """The face values of all sheets, one sheet after another; a single flat sheet is returned itself.
+    def all_shells(self) -> Shell | CombinedShells:
+        """The face values of all shells, one shell after another; a single shell of three-node faces is returned itself.
 
-        It has a mesh only if all bodies of the scene are sheets of three-node faces.
+        It has a mesh only if all deformable bodies of the scene are shells of three-node faces.
         """
-        sheets = tuple(self.current(body) for body in self.scene._bodies.sheets)
-        flat = self.scene._bodies.flat_sheets_alone
-        if flat and len(sheets) == 1:
-            return sheets[0]
-        return CombinedSheets(self.scene.mesh if flat else None, sheets)
+        shells = tuple(self.current(body) for body in self.scene._bodies.shells)
+        has_mesh = self.scene._bodies.has_only_three_node_shells
+        if has_mesh and len(shells) == 1:
+            return shells[0]
+        return CombinedShells(self.scene.mesh if has_mesh else None, shells)
 
     def contact_bodies(self, contact: Contact | BodyContact) -> tuple[Any, ...]:
         """Return the shells and solids that a contact acts on, as they are in this solve."""
-        return self.sheets[self.scene._bodies.of(contact).bodies]
+        return self.deformable[self.scene._bodies.of(contact).bodies]
 
-    def part_of(self, sheet: Shell | Solid) -> Any:
-        """Return the index ranges of one of `sheets` among all bodies."""
+    def part_of(self, body: Shell | Solid) -> Any:
+        """Return the index ranges of one of `deformable` among all bodies."""
         return next(
-            span for span, each in zip(self.scene._bodies.spans, self.sheets, strict=True) if each is sheet
+            span for span, each in zip(self.scene._bodies.spans, self.deformable, strict=True) if each is body
         )
 
     def part_of_skin(self, skin: Skin) -> Any:
         """Return the index ranges of the solid that has this skin in this solve."""
-        return self.part_of(next(each for each in self.sheets if getattr(each, "skin", None) is skin))
+        return self.part_of(next(each for each in self.deformable if getattr(each, "skin", None) is skin))
 
     @property
     def vertex_masses(self) -> np.ndarray:
         """The masses of the vertices of all bodies, (n_v,) kg. Raises ValueError if a body has no mass density."""
-        for k, sheet in enumerate(self.sheets):
-            if sheet.mass_density is None and len(self.sheets) > 1:
+        for k, body in enumerate(self.deformable):
+            if body.mass_density is None and len(self.deformable) > 1:
                 raise ValueError(f"body {k} of the scene has no mass_density [kg/m3]")
-        return joined([sheet.vertex_masses for sheet in self.sheets])
+        return joined([body.vertex_masses for body in self.deformable])
 
     @property
     def masses(self) -> np.ndarray:
@@ -182,11 +182,11 @@ class Values:
 
     @property
     def _weighed_masses(self) -> np.ndarray:
-        """The masses that gravity acts on, in the order of `masses`, kg; of sheets and rigid bodies, their inertial
+        """The masses that gravity acts on, in the order of `masses`, kg; for shells and rigid bodies, their inertial
         masses.
         """
         self.vertex_masses  # noqa: B018 - raises an error that names a body without density
-        return joined([*(body._weighed_masses for body in self.sheets), *self._masses_of_rigid()])
+        return joined([*(body._weighed_masses for body in self.deformable), *self._masses_of_rigid()])
 
     def _masses_of_rigid(self) -> list[np.ndarray]:
         masses = [points.masses(part) for points, part in zip(self.scene._rigid, self.rigid, strict=True)]

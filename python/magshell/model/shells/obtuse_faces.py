@@ -88,7 +88,7 @@ def warn_of_obtuse_faces(
     scene: Scene, positions: np.ndarray, shell: Shell, bending_energy: float, where: str
 ) -> None:
     """Warn, once per scene, if caps make the sheet too stiff in this state. where: the result, in words."""
-    if scene._warned_of_obtuse_faces or not scene.bodies or not scene._bodies.flat_sheets_alone:
+    if scene._warned_of_obtuse_faces or not scene.bodies or not scene._bodies.has_only_three_node_shells:
         return
     caps = scene._obtuse_faces
     fractions = caps.obstructed_fractions(positions, shell, bending_energy)

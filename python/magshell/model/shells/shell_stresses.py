@@ -106,7 +106,7 @@ def stresses_of(values: Any, body: Shell, state: np.ndarray) -> ShellStresses:
     Raises ValueError if the body is no shell of the scene.
     """
     scene = values.scene
-    number = next((k for k, each in enumerate(scene._bodies.sheets) if each is body), None)
+    number = next((k for k, each in enumerate(scene._bodies.shells) if each is body), None)
     if number is None:
         raise ValueError(f"a shell of the scene has stresses at its faces, got {body!r:.60}")
     with values.in_core():

@@ -96,7 +96,7 @@ def is_small(strain: float) -> bool:
 
 def strains_of(scene: Scene, state: np.ndarray, thickness: np.ndarray) -> Strains:
     """Return the strains in a state of the core. Raises ValueError if the scene has solids only."""
-    if scene._bodies.solids and not scene._bodies.sheets:
+    if scene._bodies.solids and not scene._bodies.shells:
         raise ValueError("strains() has those of shells, and the scene has none: ask result[solid].strains()")
     rows = scene._model.principal_strains(state, thickness)
     return Strains(rows[:, :2], rows[:, 2:])

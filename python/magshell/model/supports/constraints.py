@@ -27,7 +27,7 @@ class VertexConstraint(NamedTuple):
     move: RigidMove | None
 
 
-# Load fractions at which moves are compared: a rotation by a full turn agrees with rest at 1, but not at 0.37.
+# Fractions of two moves at which they are compared: a rotation by a full turn ends where it began at 1, but not at 0.37.
 _COMPARED_AT = (0.37, 1.0)
 
 
@@ -38,12 +38,12 @@ class Constraints:
     directed_edges: np.ndarray  # (k, 2): the scene's edge, direction
     directions: np.ndarray  # (n_d, 3)
     held_nodes: np.ndarray  # (m, 5): node, number of held directions, number of the move of each or -1
-    held_frames: (
-        np.ndarray
-    )  # (m, 3, 3): columns, the held directions first, then those along which it is tied
-    equations: tuple[Equations, ...]  # of all ties of displacements, with the scene's vertices
-    tied: tuple[TiedDof, ...]  # what follows from them
-    bound: list[Any]  # ties whose displacements must not change in time, as supports prescribe the same
+    held_frames: np.ndarray  # (m, 3, 3): columns; the held directions first, then those along which ties act
+    equations: tuple[Equations, ...]  # those of all ties of displacements, with the scene's vertices
+    tied: tuple[TiedDof, ...]  # the dofs that these equations eliminate
+    bound: list[
+        Any
+    ]  # ties that prescribe what supports prescribe too, so that their displacements must not change in time
     moves: tuple[RigidMove, ...]
     direction_owners: tuple[Any, ...]  # (n_d,), the support that holds each direction, or None
 
@@ -128,9 +128,9 @@ def _directed(support, span: Span) -> list[DirectedEdges]:
 def free_rigid_motions(
     bodies: Bodies, constraints: Constraints, on_joints: Sequence[Joint] = ()
 ) -> list[str]:
-    """Return words for the rigid motions that no support prevents, of every connected component.
+    """Return a description of each rigid motion of a connected component that no support prevents.
 
-    on_joints: vertices that a skeleton holds as far as its joints do; their components are left out.
+    on_joints: vertices fixed to links of skeletons; their components are left out, because joints may hold them.
     """
     found, mesh, size = [], bodies.mesh, bodies.size
     components = bodies.components
@@ -192,7 +192,7 @@ def _equations(support: Support, span: Span, bodies: Bodies) -> list[Equations]:
 
 
 def _tied_along(equations: list[Equations]) -> dict[int, list[np.ndarray]]:
-    """Return for each tied vertex the directions of its ties that are no world axes."""
+    """Return the directions of ties that are no world axes, for each tied vertex."""
     found: dict[int, list[np.ndarray]] = {}
     for each in equations:
         slanted = [each.direction] * int(np.abs(each.direction).max() != 1.0)
@@ -210,7 +210,8 @@ def _held_vertices(
 ):
     """Return the rows of held_nodes and held_frames of all vertices that supports hold or tie.
 
-    numbers: of moves, by their id. tied: directions by vertex along which it is tied, without world axes.
+    numbers: the number of each move, by its id. tied: for each tied vertex, the directions of its ties that are no world
+        axes.
     """
     constraints: dict[int, list[VertexConstraint]] = {vertex: [] for vertex in tied}
     for support in held:
@@ -221,7 +222,7 @@ def _held_vertices(
         _check_agree(bodies, vertex, some)
         frame, count, by = _frame(some) if some else (np.eye(3), 0, [None] * 3)
         if count < 3 and tied.get(vertex):
-            frame = _turned_into(frame[:, :count], tied[vertex])
+            frame = _completed_frame(frame[:, :count], tied[vertex])
         nodes.append((vertex, count, *(_number(move, moves, numbers) for move in by)))
         frames.append(frame)
     return nodes, frames
@@ -239,8 +240,8 @@ def _number(move: RigidMove | None, moves: list[RigidMove], numbers: dict[int, i
 def _check_agree(bodies, vertex: int, constraints: list[VertexConstraint]) -> None:
     """Raise ValueError if supports that share a vertex disagree on its position.
 
-    They may hold it along directions at right angles, or along others if they move it to the same position. A fixed support
-    and a moving one may share a vertex if the move has no component along the directions of the fixed one.
+    Two moving supports may hold a vertex along directions at right angles; along others, they must move it to the same
+    position. A fixed support and a moving one may share a vertex if the move has no component along the fixed directions.
     """
     point = bodies.mesh.rest_positions[[vertex]]
 
@@ -300,8 +301,10 @@ def _frame(constraints: list[VertexConstraint]) -> tuple[np.ndarray, int, list[R
     return np.column_stack([columns, free]), len(by), [*by, None, None, None][:3]
 
 
-def _turned_into(held: np.ndarray, directions: list[np.ndarray]) -> np.ndarray:
-    """Return an orthonormal frame (columns): held directions (3, m), then others as far as they are perpendicular."""
+def _completed_frame(held: np.ndarray, directions: list[np.ndarray]) -> np.ndarray:
+    """Return an orthonormal frame (columns): held directions (3, m), then the parts of `directions` perpendicular to
+    them.
+    """
     columns = held
     for along in directions:
         remaining = along - columns @ (columns.T @ along)
@@ -358,7 +361,9 @@ def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np
 def _in_words(mode: np.ndarray, center: np.ndarray, size: float) -> str:
     shown = mode[3:] if np.linalg.norm(mode[3:]) >= 1e-6 else mode[:3]
     first = int(np.argmax(np.abs(shown) > 0.5 * np.abs(shown).max()))
-    mode = mode * np.sign(shown[first])  # either sign is right, and which one comes depends on rounding
+    mode = mode * np.sign(
+        shown[first]
+    )  # the sign of a mode is arbitrary; here it does not depend on rounding
     translation, rotation = mode[:3], mode[3:]
     if np.linalg.norm(rotation) < 1e-6:
         return f"translation along {_vector(translation)}"

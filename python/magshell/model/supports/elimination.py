@@ -17,7 +17,8 @@ _PARALLEL = 1e-9  # [-] of a direction along another
 class TiedDof(NamedTuple):
     """A displacement that is a sum of others and of prescribed ones.
 
-    dof, parts: three times a vertex, plus an axis of its frame; each part with its weight. moves: (move, axis, weight).
+    A dof has the number 3 vertex + axis, for an axis of the vertex's frame. parts: (dof, weight). moves: (number of a
+    support's move, axis, weight).
     """
 
     dof: int
@@ -26,7 +27,7 @@ class TiedDof(NamedTuple):
 
 
 class Frames:
-    """The axes along which the displacements of each vertex count: the world's, or those of its own frame.
+    """The axes of the displacements of each vertex: those of the world, or of its own frame.
 
     nodes: (k, 5), frames: (k, 3, 3), as in Constraints.
     """
@@ -43,7 +44,7 @@ class Frames:
                 self.held[3 * vertex + axis] = moves[k]
 
     def along(self, vertex: int, direction: np.ndarray) -> tuple[int, float] | None:
-        """Return the dof of a vertex along a unit vector, and its sign; None if there is none."""
+        """Return the dof of a vertex whose axis is parallel to a unit vector, and the sign; None if no axis is parallel."""
         parts = direction @ self._own.get(vertex, np.eye(3))
         axis = int(np.argmax(np.abs(parts)))
         if np.abs(np.delete(parts, axis)).max() > _PARALLEL:
@@ -54,7 +55,7 @@ class Frames:
 def eliminated(
     equations: Iterable[Equations], frames: Frames, number_of_move: Any
 ) -> tuple[tuple[TiedDof, ...], list[Any]]:
-    """Return the dofs that the equations determine from the others, and ties whose displacements must stay as they are.
+    """Return the dofs that the equations determine from the others, and the ties whose displacements must not change.
 
     The latter prescribe what supports or other ties prescribe as well. number_of_move: (move or None) -> its number in the
     core. Raises ValueError if equations contradict each other or supports, or if a vertex has no axis along the direction of

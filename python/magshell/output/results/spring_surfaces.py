@@ -56,7 +56,7 @@ def creases_of(scene: Scene) -> np.ndarray:
     bodies = scene._bodies
     edges = [
         span.mesh.edges[crease.edges] + span.first_vertex
-        for body, span in zip(bodies.shells, bodies.spans, strict=True)
+        for body, span in zip(bodies.deformable, bodies.spans, strict=True)
         for crease in getattr(body, "creases", ())
     ]
     return np.concatenate([np.zeros((0, 2), dtype=np.int64), *edges])

@@ -195,7 +195,7 @@ def states_of(
         states = _with_springs(what, states, positions)
         states = _with_elements(what, states, positions)
         if what.scene.bodies and hasattr(what, "_values_at"):
-            states = _with_thickness(states, lambda k: what._values_at(k).sheets)
+            states = _with_thickness(states, lambda k: what._values_at(k).deformable)
         own_times = isinstance(what, Trajectory) and len(states) == len(what)
         return timed(states, what.times) if own_times else states
     if isinstance(what, Iterable) and not isinstance(what, str | bytes | np.ndarray):
@@ -272,7 +272,7 @@ def _with_elements(result, states: list[State], positions) -> list[State]:
     def elements_of(k: int):
         return lambda: [
             (span.first_face, body.mesh, result_of(result, body).stresses(k))
-            for body, span in zip(bodies.shells, bodies.spans, strict=True)
+            for body, span in zip(bodies.deformable, bodies.spans, strict=True)
         ]
 
     def loads_of(k: int):

@@ -120,7 +120,7 @@ def _thickness(what, state: State, given, index: int) -> np.ndarray | None:
     elif isinstance(what, Scene):
         bodies = what.bodies
     elif hasattr(what, "_values_at"):
-        bodies = what._values_at(index).sheets
+        bodies = what._values_at(index).deformable
     else:
         raise ValueError('thickness="own" needs a result, a Scene or a Shell: give a number, m')
     return thickness_of(bodies)

@@ -65,8 +65,8 @@ def simulate_batch(
     def solve(member: int, check: Callable[[], None]) -> Member:
         keywords, leaves = given(member)
         one = run(scene, keywords, each[member], lambda fraction: check())
-        arrays, adjoint = arrays_of(one.asked, one.found), MotionAdjoint(one.asked, one.found)
-        return Member(one.result, arrays, adjoint, one.asked.inputs.tensors, leaves)
+        arrays, adjoint = arrays_of(one.motion_inputs, one.found), MotionAdjoint(one.motion_inputs, one.found)
+        return Member(one.result, arrays, adjoint, one.motion_inputs.inputs.tensors, leaves)
 
     def missing() -> tuple[np.ndarray, ...]:
         model, recorded = scene._model, 1 + steps // first.record_every

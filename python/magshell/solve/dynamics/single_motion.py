@@ -65,7 +65,7 @@ class Motion(NamedTuple):
     """A motion, its inputs, and the result of the core, with what it stored for gradients."""
 
     result: Trajectory
-    asked: MotionInputs
+    motion_inputs: MotionInputs
     found: Any
 
 
@@ -149,28 +149,35 @@ def run(
     """
     time_step = arguments["time_step"]
     prepared = preparation(scene, arguments, options)
-    asked = prepared(None)
-    scene = asked.inputs.scene  # with other rest positions than the given one, perhaps
+    motion_inputs = prepared(None)
+    scene = motion_inputs.inputs.scene  # another scene if values replace rest positions
     began = time.perf_counter()
-    watch = stop_at_once if asked.interrupted else lambda fraction, residual: progress(fraction)
-    along = None if isinstance(time_step, Adaptive) else _asked_tangents(asked)
+    watch = stop_at_once if motion_inputs.interrupted else lambda fraction, residual: progress(fraction)
+    along = None if isinstance(time_step, Adaptive) else _requested_tangents(motion_inputs)
     known = None
-    with asked.inputs.in_core():
-        check_apart(scene, asked.start.state)
+    with motion_inputs.inputs.in_core():
+        check_apart(scene, motion_inputs.start.state)
         if along is None:
-            leaves = bool(asked.inputs.leaves)
-            found = _core.simulate(scene._model, asked.core, leaves, asked.memory_budget, asked.keep, watch)
+            leaves = bool(motion_inputs.inputs.leaves)
+            found = _core.simulate(
+                scene._model,
+                motion_inputs.core,
+                leaves,
+                motion_inputs.memory_budget,
+                motion_inputs.keep,
+                watch,
+            )
         else:
-            found, tangents = motion_with_tangents(asked, along, watch)
+            found, tangents = motion_with_tangents(motion_inputs, along, watch)
             known = along, tangents
     if isinstance(time_step, Adaptive):
-        asked = prepared(found.time_steps, asked.inputs.values)
-    result = _with_strains(_trajectory(asked, found, time.perf_counter() - began, known))
+        motion_inputs = prepared(found.time_steps, motion_inputs.inputs.values)
+    result = _with_strains(_trajectory(motion_inputs, found, time.perf_counter() - began, known))
     log.debug(
         "simulate: %s, %d of %d steps, %d in parts, %d iterations, %d factorizations, %.3g s",
         found.outcome.name,
         result.steps_done,
-        asked.steps,
+        motion_inputs.steps,
         len(result.substeps),
         found.iterations,
         found.factorizations,
@@ -179,9 +186,10 @@ def run(
     if found.outcome == _core.Outcome.interrupted:
         raise Interrupted(f"interrupted after {result.steps_done} of {options.steps} steps", result)
     if found.outcome == _core.Outcome.failed:
-        where = f"{found.steps_done} of {len(asked.time_steps)}, at {result.end.time:.6g} s, failed even in parts of 1/64"
+        count = len(motion_inputs.time_steps)
+        where = f"{found.steps_done} of {count}, at {result.end.time:.6g} s, failed even in parts of 1/64"
         if isinstance(time_step, Adaptive):
-            shortest = asked.time_steps.clock.time_step / 2**time_step._deepest
+            shortest = motion_inputs.time_steps.clock.time_step / 2**time_step._deepest
             where = f"{found.steps_done}, at {result.end.time:.6g} s, failed even with a length of {shortest:.3g} s"
         advice = _advice(result, isinstance(time_step, Adaptive))
         raise NotConverged(
@@ -191,14 +199,14 @@ def run(
     most = int(np.argmax(bending))
     positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
     where = f"the motion, at {result.times[most]:.4g} s,"
-    warn_of_obtuse_faces(scene, positions, asked.inputs.values.all_sheets, bending[most], where)
+    warn_of_obtuse_faces(scene, positions, motion_inputs.inputs.values.all_shells, bending[most], where)
     _warn(result)
     warn_of_steps(result)
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         _warn_of_fields(result)
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
-    return Motion(result, asked, found)
+    return Motion(result, motion_inputs, found)
 
 
 def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
@@ -260,40 +268,44 @@ def _warn_of_fields(result: Trajectory) -> None:
     )
 
 
-def _asked_tangents(asked: MotionInputs) -> Sequence[np.ndarray] | None:
+def _requested_tangents(motion_inputs: MotionInputs) -> Sequence[np.ndarray] | None:
     """Return the changes of all leaves along which forward mode asks for tangents now; None if it does not."""
-    if not asked.inputs.leaves:
+    if not motion_inputs.inputs.leaves:
         return None
     from ..adjoint.autograd import tangents_of
 
-    return tangents_of(asked.inputs.tensors)
+    return tangents_of(motion_inputs.inputs.tensors)
 
 
-def _trajectory(asked: MotionInputs, found, wall_time: float, known=None) -> Trajectory:
-    scene, model, values = asked.inputs.scene, asked.inputs.scene._model, asked.inputs.values
-    points, edge_rotations, velocities, driving = _outputs(asked, found, known)
+def _trajectory(motion_inputs: MotionInputs, found, wall_time: float, known=None) -> Trajectory:
+    scene, model, values = (
+        motion_inputs.inputs.scene,
+        motion_inputs.inputs.scene._model,
+        motion_inputs.inputs.values,
+    )
+    points, edge_rotations, velocities, driving = _outputs(motion_inputs, found, known)
     rigid, n_v = bool(scene.rigid_parts), scene.mesh.n_vertices
     recorded = len(found.kinetic_energy)
-    grid, after = asked.time_steps, np.array(found.steps_recorded, dtype=np.int64)
+    grid, after = motion_inputs.time_steps, np.array(found.steps_recorded, dtype=np.int64)
     ended = grid.clock_after(found.steps_done)
-    thickness = values.all_sheets.thickness
+    thickness = values.all_shells.thickness
     with values.growth_in_core():
         strain = StrainHistory.of(found.largest_strains(model, thickness))
     by_term = np.array(found.energies).reshape(recorded, -1)
     return Trajectory(
         scene=scene,
-        integrator=asked.integrator,
-        times=grid.grid_times[asked.record_every * np.arange(recorded)],
+        integrator=motion_inputs.integrator,
+        times=grid.grid_times[motion_inputs.record_every * np.arange(recorded)],
         positions=points[:, :n_v] if rigid else points,
         velocities=velocities[:, :n_v] if rigid else velocities,
         edge_rotations=edge_rotations,
-        remanent_magnetization=asked.inputs.given_magnetization,
-        applied_flux_density=asked.recorded("applied_flux_density", after),
+        remanent_magnetization=motion_inputs.inputs.given_magnetization,
+        applied_flux_density=motion_inputs.recorded("applied_flux_density", after),
         kinetic_energy=np.array(found.kinetic_energy),
         energies=_by_name(model.term_names, by_term),
         largest_membrane_strain=strain.membrane,
         largest_bending_strain=strain.bending,
-        steps=asked.steps,
+        steps=motion_inputs.steps,
         steps_done=int(np.searchsorted(grid.grid_ends, found.steps_done, side="right")) - 1,
         substeps={step: len(parts) for step, parts in found.substeps.items() if len(parts) > 1},
         fallback_steps=tuple(
@@ -311,7 +323,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float, known=None) -> Tra
             found.last_maxwell_strains(model),
             found.last_maxwell_strain_rates(model),
             ended,
-            found.begun or asked.start.rotations_known,
+            found.begun or motion_inputs.start.rotations_known,
             found.last_contact_acceleration,
             fine_faces(values),
         ),
@@ -321,9 +333,9 @@ def _trajectory(asked: MotionInputs, found, wall_time: float, known=None) -> Tra
         bytes=found.bytes,
         wall_time=wall_time,
         linear_time=found.linear_time,
-        _field_factors=asked.recorded("field_factor", after),
-        _load_factors=asked.recorded("load_factor", after),
-        _varied=asked.varied(after),
+        _field_factors=motion_inputs.recorded("field_factor", after),
+        _load_factors=motion_inputs.recorded("load_factor", after),
+        _varied=motion_inputs.varied(after),
         _step_factorizations=np.array(found.step_factorizations, dtype=np.int64),
         _thickness=thickness,
         _values=values,
@@ -332,7 +344,7 @@ def _trajectory(asked: MotionInputs, found, wall_time: float, known=None) -> Tra
         _own_points=points[:, n_v:] if rigid else None,
         _own_velocities=velocities[:, n_v:] if rigid else None,
         _driving=driving,
-        _rest=asked.inputs.given_rest,
+        _rest=motion_inputs.inputs.given_rest,
     )
 
 
@@ -344,17 +356,19 @@ def _by_name(names: list[str], by_term: np.ndarray) -> dict[str, np.ndarray]:
     return sums
 
 
-def arrays_of(asked: MotionInputs, found: _core.MotionResult) -> tuple[np.ndarray, ...]:
+def arrays_of(motion_inputs: MotionInputs, found: _core.MotionResult) -> tuple[np.ndarray, ...]:
     """Return positions, edge rotations and velocities, with the points of rigid bodies, and the forces of motors."""
-    model = asked.inputs.scene._model
+    model = motion_inputs.inputs.scene._model
     return found.positions(model), found.edge_rotations(model), found.velocities(model), found.driving()
 
 
-def _outputs(asked: MotionInputs, found, known):
+def _outputs(motion_inputs: MotionInputs, found, known):
     """Return the arrays as tensors if an input is a tensor, connected to those that require a gradient."""
-    inputs, arrays = asked.inputs, arrays_of(asked, found)
+    inputs, arrays = motion_inputs.inputs, arrays_of(motion_inputs, found)
     if not inputs.leaves:
         return tuple(like(array, *inputs.given) for array in arrays)
     from ..adjoint.autograd import solved
 
-    return solved(MotionAdjoint(asked, found, known), arrays, dtype_like(*inputs.given), inputs.tensors)
+    return solved(
+        MotionAdjoint(motion_inputs, found, known), arrays, dtype_like(*inputs.given), inputs.tensors
+    )

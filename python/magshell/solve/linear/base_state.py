@@ -25,7 +25,7 @@ def idle_inputs(
     _refuse_own_field(scene)
     if scene.fields:
         nothing = {"remanent_magnetization": np.zeros(3)}
-        magnetic = (*scene._bodies.sheets, *scene._bodies.skins)
+        magnetic = (*scene._bodies.shells, *scene._bodies.skins)
         replaced = {**replaced, **{each: {**nothing, **replaced.get(each, {})} for each in magnetic}}
     if flux_density is None and scene.has_uniform_field and not factors:
         flux_density = np.zeros(3)

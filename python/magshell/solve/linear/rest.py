@@ -90,7 +90,7 @@ def refuse_what_acts(inputs: Inputs) -> None:
     """
     model = inputs.scene._model
     _refuse_custom_forces(inputs)
-    for own in inputs.scene._bodies.sheets:
+    for own in inputs.scene._bodies.shells:
         for crease in map(inputs.values.current, own.creases):
             if crease._pulls_in(own.mesh):
                 raise ValueError(

@@ -69,7 +69,7 @@ def masses_of_vertices(values: Values) -> scipy.sparse.csc_array:
     scene = values.scene
     original, n_v = scene._bodies.original, scene.mesh.n_vertices
     rows, columns, numbers = [], [], []
-    for span, body in zip(scene._bodies.spans, values.sheets, strict=True):
+    for span, body in zip(scene._bodies.spans, values.deformable, strict=True):
         skin = getattr(body, "skin", None)
         for nodes, masses in (body.element_masses, *(() if skin is None else (skin.element_masses,))):
             at = original[span.vertices][nodes]
@@ -213,7 +213,7 @@ def vibration_modes(
         if scene.rigid_parts:
             masses = model.free_weights(inputs.values.masses)  # as the parts are turned there
             inertia = model.free_weight_values(inputs.values.masses)
-    slow = min(map(_slow_square, inputs.values.sheets), default=1.0)
+    slow = min(map(_slow_square, inputs.values.deformable), default=1.0)
     if consistent is not None:
         inertia = nonzeros_in_pattern(consistent, *stiffness[1:3])
     pencil = _Pencil(stiffness, low_rank, model.free_points, masses, slow, inertia, consistent)

@@ -118,7 +118,7 @@ def _unbalanced_vertices(inputs, found) -> tuple[list[str], np.ndarray]:
 
 
 def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
-    scene, shell = inputs.scene, inputs.values.all_sheets
+    scene, shell = inputs.scene, inputs.values.all_shells
     free = [f"rigid part {k}" for k, part in enumerate(scene.rigid_parts) if part.vertices is None]
     if free and "singular" in found.reason:
         return (
@@ -132,7 +132,7 @@ def _advice(inputs, found, at_rest: bool, near: np.ndarray) -> str:
             "Start from positions where no element is so, take smaller steps there, or a material that has an energy "
             "there (StableNeoHookean)."
         )
-    if not scene._bodies.flat_sheets_alone:
+    if not scene._bodies.has_only_three_node_shells:
         return _general_advice(inputs, found, at_rest)
     mesh, quality = scene.mesh, shell.quality
     tiny = np.flatnonzero(quality.heights < SHORTEST_HEIGHT * np.median(mesh.edge_lengths))

@@ -364,13 +364,13 @@ def _element_kind(scene: Scene, by: str, body: Shell | Solid | None) -> tuple[bo
         raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
     bodies, kind = scene._bodies, _KINDS[by]
     if body is None:
-        found = [each for each in (*bodies.sheets, *bodies.solids) if isinstance(each, kind)]
+        found = [each for each in (*bodies.shells, *bodies.solids) if isinstance(each, kind)]
         if len(found) != 1:
             raise ValueError(f"the scene has {len(found)} bodies with energies by {by}: choose one by body=")
         (body,) = found
     elif not isinstance(body, kind):
         raise ValueError(f"a {type(body).__name__} has no energies by {by}")
-    among = bodies.sheets if kind is Shell else bodies.solids
+    among = bodies.shells if kind is Shell else bodies.solids
     return kind is Solid, next(k for k, each in enumerate(among) if each is body)
 
 
@@ -391,6 +391,6 @@ def _of_elements(adjoint: EnergyAdjoint, of_solid: bool, number: int) -> dict[st
 def _of_body(scene, number: int, of_terms: list[tuple[str, float]]) -> dict[str, float]:
     """Return the elastic energies of one body; the core lists elastic terms in the order of the bodies, one each."""
     body, bodies = scene.bodies[number], scene._bodies
-    kind, names = (bodies.solids, ("solid",)) if isinstance(body, Solid) else (bodies.sheets, _ELASTIC)
+    kind, names = (bodies.solids, ("solid",)) if isinstance(body, Solid) else (bodies.shells, _ELASTIC)
     before = next(k for k, each in enumerate(kind) if each is body)
     return {name: [energy for each, energy in of_terms if each == name][before] for name in names}

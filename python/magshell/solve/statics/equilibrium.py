@@ -144,7 +144,7 @@ class Equilibrium(SaveMixin, OfOneBody):
         if (solid := self._one_solid()) is not None:
             return solid.strains()
         with self._values.growth_in_core():
-            return strains_of(self.scene, self._state, self._values.all_sheets.thickness)
+            return strains_of(self.scene, self._state, self._values.all_shells.thickness)
 
     def contact_state(self, contact: BodyContact | Contact) -> ContactState:
         """Return the active pairs of a contact and their forces."""

@@ -183,7 +183,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         if (solid := self._one_solid()) is not None:
             return solid.strains(index)
         with self._values_at(index).growth_in_core():
-            return strains_of(self.scene, self._state_at(index), self._inputs.values.all_sheets.thickness)
+            return strains_of(self.scene, self._state_at(index), self._inputs.values.all_shells.thickness)
 
     def __getitem__(self, body: Any) -> Any:
         """Return the results of one object of the scene, a row for each point; `equilibrium` returns points."""
@@ -410,7 +410,7 @@ def _follow(
     if len(bending):
         most = int(np.argmax(bending))
         where = f"the path, at parameter {path.parameters[most]:.4g},"
-        warn_of_obtuse_faces(scene, path.positions[most], inputs.values.all_sheets, bending[most], where)
+        warn_of_obtuse_faces(scene, path.positions[most], inputs.values.all_shells, bending[most], where)
     strain = StrainHistory(path.largest_membrane_strain, path.largest_bending_strain)
     k = strain.worst
     warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
@@ -439,7 +439,7 @@ def _warn_of_fields(path: EquilibriumPath) -> None:
 
 def _bending_energies(scene: Scene, found, load_parameters) -> list[float]:
     """Return the bending energies of the points if the mesh has obtuse faces, for whose warning they are needed; else []."""
-    if not scene._bodies.flat_sheets_alone or not scene._obtuse_faces.faces.size:
+    if not scene._bodies.has_only_three_node_shells or not scene._obtuse_faces.faces.size:
         return []
     return [scene._model.energies(point.state, load_parameters).get("bending", 0.0) for point in found.points]
 
@@ -485,4 +485,4 @@ def _path(inputs: Inputs, moving: AlongPath, found, begin, options, wall_time: f
 
 def _largest(model, values: Values, point) -> tuple[Any, ...]:
     with values.growth_in_core():
-        return model.largest_strains(point.state, values.all_sheets.thickness)
+        return model.largest_strains(point.state, values.all_shells.thickness)

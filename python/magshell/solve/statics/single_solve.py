@@ -177,7 +177,7 @@ def solve(
     found, inputs, stopped = _with_fine_faces_at_end(found, inputs, end, options, progress)
     with inputs.in_core():
         energies, arrays = _energies(scene, found), arrays_of(scene, found)
-        strain = largest_of(scene, found.state, inputs.values.all_sheets.thickness)
+        strain = largest_of(scene, found.state, inputs.values.all_shells.thickness)
     result = _result(inputs, found, energies, arrays, strain, time.perf_counter() - began)
     log.debug(
         "equilibrium: %s, %.4g of the way, %d iterations, %d factorizations, residual %.2g, %.3g s",
@@ -198,7 +198,7 @@ def solve(
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     positions = scene._model.positions(found.state)
     warn_of_obtuse_faces(
-        scene, positions, inputs.values.all_sheets, result.energies.get("bending", 0.0), "this equilibrium"
+        scene, positions, inputs.values.all_shells, result.energies.get("bending", 0.0), "this equilibrium"
     )
     warn_if_large(
         result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"

@@ -70,7 +70,7 @@ def state_in(scene: Scene, start: Equilibrium) -> np.ndarray:
 
 def check_faces(scene: Scene, positions: np.ndarray, name: str = "start") -> None:
     """Raise ValueError for a face of a shell without area, which has no normal. Materials check the elements of solids."""
-    for body, span in zip(scene._bodies.shells, scene._bodies.spans, strict=True):
+    for body, span in zip(scene._bodies.deformable, scene._bodies.spans, strict=True):
         if isinstance(body, Solid):
             continue
         corners = positions[span.vertices][span.mesh.faces]
