@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy
+
+from .connected import connected_groups
 
 EDGES = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
 FACES = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
@@ -101,15 +102,6 @@ def triangles_of(tetrahedra: np.ndarray, outer: np.ndarray) -> tuple[np.ndarray,
     return nodes[:, FLAT].reshape(-1, 3), np.repeat(owner, 4)
 
 
-def groups(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Return the number, from 0, of the connected component that each of `count` items belongs to, (count,).
-
-    pairs: (k, 2), the items that are connected.
-    """
-    graph = scipy.sparse.coo_array((np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(count, count))
-    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
-
-
 def nonmanifold_edges(faces: np.ndarray) -> np.ndarray:
     """Return the edges at which more than two triangles of a closed surface meet, (k, 2)."""
     ends = np.sort(faces[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
@@ -131,7 +123,7 @@ def nonmanifold_vertices(faces: np.ndarray) -> np.ndarray:
     pairs = np.concatenate(
         [np.stack([at_start[one], at_end[other]], axis=1), np.stack([at_end[one], at_start[other]], axis=1)]
     )
-    fans = groups(corner.size, pairs)
+    fans = connected_groups(corner.size, pairs)
     first = np.unique(fans, return_index=True)[1]
     vertex, counts = np.unique(faces.ravel()[first], return_counts=True)
     return vertex[counts > 1]

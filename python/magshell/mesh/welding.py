@@ -11,10 +11,10 @@ import scipy
 
 from .._input.quantity import quantity
 from .._runtime.frozen import immutable
+from .connected import connected_groups
 from .groups import Members, merged, renumbered
 from .selection import RELATIVE_TOLERANCE
 from .tetrahedra.tet_mesh import TetMesh
-from .topology import groups
 from .triangles.triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def weld_solids(meshes: tuple[TetMesh, ...], tolerance: float | None) -> TetWeld
     )
     pairs = surface[scipy.spatial.cKDTree(positions[surface]).query_pairs(tolerance, output_type="ndarray")]
     pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
-    group = groups(len(positions), pairs)
+    group = connected_groups(len(positions), pairs)
     _refuse_closed_slits(group, owner, offsets)
     first = np.unique(group, return_index=True)[1]
     number = np.empty(len(positions), dtype=np.int64)
@@ -144,7 +144,7 @@ def _check_solids_connected(meshes, joined: TetMesh, maps, tolerance: float) -> 
             np.unique(pieces, axis=0),
             np.array([[first[k], first[k] + c] for c in range(mesh.n_components)]),
         ]
-    group = groups(first[-1] + joined.n_components, np.concatenate(pairs))[first[:-1]]
+    group = connected_groups(first[-1] + joined.n_components, np.concatenate(pairs))[first[:-1]]
     apart = np.flatnonzero(group != group[0])
     if len(apart):
         raise ValueError(
@@ -281,10 +281,7 @@ def _vertex_maps(meshes, tolerance: float) -> list[np.ndarray]:
     pairs = pairs[mesh_of[pairs[:, 0]] != mesh_of[pairs[:, 1]]]
     if len(pairs) == 0:
         _raise_not_connected(meshes, np.arange(len(meshes)), tolerance)
-    graph = scipy.sparse.coo_array(
-        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(mesh_of), len(mesh_of))
-    )
-    cluster = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    cluster = connected_groups(len(mesh_of), pairs)
 
     _refuse_closed_slits(cluster, mesh_of, offsets)
     _, first, number = np.unique(cluster, return_index=True, return_inverse=True)
@@ -326,12 +323,8 @@ def _check_seams(meshes, maps: list[np.ndarray], tolerance: float) -> None:
             f"meshes {part[k]} and {part[k + 1]} are oriented against each other along their seam: "
             f"weld meshes[{part[k + 1]}].flipped() instead"
         )
-    shape = (len(meshes), len(meshes))
-    graph = scipy.sparse.coo_array(
-        (np.ones(len(seams), dtype=bool), (part[seams], part[seams + 1])), shape=shape
-    )
-    n_groups, group = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    if n_groups > 1:
+    group = connected_groups(len(meshes), np.stack([part[seams], part[seams + 1]], axis=1))
+    if group.any():
         _raise_not_connected(meshes, group, tolerance)
 
 

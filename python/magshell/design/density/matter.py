@@ -11,8 +11,8 @@ from ..._input.arrays import number
 from ..._input.quantity import quantity
 from ..._input.tensors import detached, real_tensor, require_torch
 from ..._runtime.frozen import Frozen
+from ...mesh.connected import connected_groups
 from ...mesh.groups import renumbered
-from ...mesh.topology import groups
 from ...mesh.triangles.fans import corner_vertices, opened
 from ...mesh.triangles.triangle_mesh import TriangleMesh, checked_mesh
 from .cells import cells_of, checked_density, laplacian
@@ -78,7 +78,7 @@ class Matter(Frozen):
             )
         dense = numbers >= self.least_density
         pairs = mesh.edge_faces[mesh.interior_edges]
-        part = groups(mesh.n_faces, pairs[dense[pairs].all(axis=1)])
+        part = connected_groups(mesh.n_faces, pairs[dense[pairs].all(axis=1)])
         remains = dense & np.isin(part, part[held])
         self.left_out: int = int(np.count_nonzero(dense & ~remains))
         self.faces = np.flatnonzero(remains)
@@ -166,7 +166,7 @@ class Matter(Frozen):
         moved[before.vertices] = positions - before.mesh.rest_positions
         moved = moved[self.vertices]
         new = np.isnan(moved[:, 0])
-        part = groups(self.mesh.n_vertices, self.mesh.edges)
+        part = connected_groups(self.mesh.n_vertices, self.mesh.edges)
         moved[~np.isin(part, part[~new])] = 0.0
         new = np.isnan(moved[:, 0])
         if new.any():

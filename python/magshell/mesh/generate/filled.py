@@ -6,8 +6,9 @@ import numpy as np
 
 from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
+from ..connected import connected_groups
 from ..tetrahedra.tet_mesh import TetMesh
-from ..topology import face_table, groups
+from ..topology import face_table
 from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
 from ._gmsh_session import gmsh_session
 from ._tet_cells import check_order, check_size, oriented
@@ -111,7 +112,7 @@ def _within(tetrahedra: np.ndarray, surface: TriangleMesh) -> np.ndarray:
     on_surface[rank[is_surface]] = True
     first = table.first[(table.counts == 2) & ~on_surface]
     pairs = np.stack([number[first], number[first + 1]], axis=1)
-    region = groups(len(both), pairs[(pairs < n).all(axis=1)])
+    region = connected_groups(len(both), pairs[(pairs < n).all(axis=1)])
 
     runs_even = np.zeros(len(table.first), dtype=bool)
     # face 3 has the nodes (0, 2, 1): the opposite orientation

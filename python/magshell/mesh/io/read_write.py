@@ -19,6 +19,7 @@ from ..._runtime.files import replacing
 from ..._runtime.solver_entry_point import grouped
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import MeshGroupWarning, UnitWarning
+from ..connected import connected_groups
 from ..groups import counts, renumbered
 from ..selection import RELATIVE_TOLERANCE
 from ..tetrahedra.tet_mesh import TetMesh
@@ -406,14 +407,7 @@ def _merge_coincident(found: TriangleContent) -> None:
     points = found.points
     tolerance = RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
     pairs = scipy.spatial.cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-    graph = scipy.sparse.coo_array(
-        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(len(points), len(points))
-    )
-    _, first, vertex = np.unique(
-        scipy.sparse.csgraph.connected_components(graph, directed=False)[1],
-        return_index=True,
-        return_inverse=True,
-    )
+    _, first, vertex = np.unique(connected_groups(len(points), pairs), return_index=True, return_inverse=True)
     vertex = vertex.ravel()
     found.points, found.faces = points[first], vertex[found.faces]
     found.named.groups = renumbered(found.named.groups, vertex)

@@ -11,7 +11,8 @@ import scipy
 from ..._input.arrays import index_array
 from ..._input.quantity import quantity
 from ..._runtime.frozen import immutable
-from ..topology import MIRRORED, groups
+from ..connected import connected_groups
+from ..topology import MIRRORED
 from .checks import check_range, duplicates, names_twice, plural
 from .jacobian import straight_volumes
 from .selection import checked_parts
@@ -108,5 +109,5 @@ def coincident(positions: np.ndarray, tolerance: float) -> np.ndarray:
     if tolerance < 0:
         raise ValueError(f"merge_tolerance [m] must not be negative, got {tolerance}")
     pairs = scipy.spatial.cKDTree(positions).query_pairs(tolerance, output_type="ndarray")
-    group = groups(len(positions), pairs)
+    group = connected_groups(len(positions), pairs)
     return np.unique(group, return_index=True)[1][group]

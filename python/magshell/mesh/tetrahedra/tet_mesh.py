@@ -10,6 +10,7 @@ import numpy as np
 from ..._input.arrays import index_array
 from ..._input.quantity import quantity
 from ..._input.scalars import positive
+from ..connected import connected_groups
 from ..mesh_base import frozen
 from ..topology import (
     FACE_NODES,
@@ -17,7 +18,6 @@ from ..topology import (
     MIRRORED,
     edge_table,
     face_table,
-    groups,
     neighbours,
     outer_faces,
     triangles_of,
@@ -272,7 +272,7 @@ class TetMesh(TetSelection):
     @cached_property
     def components(self) -> np.ndarray:
         """The number, from 0, of the connected piece that each vertex belongs to, (n_v,)."""
-        piece = groups(self.n_tetrahedra, neighbours(self._face_table))
+        piece = connected_groups(self.n_tetrahedra, neighbours(self._face_table))
         of_vertex = np.empty(self.n_vertices, dtype=np.int32)
         of_vertex[self.tetrahedra] = piece[:, None]
         return frozen(of_vertex)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
+from ..connected import connected_groups
 from ..groups import Members, members, row_numbers
 from .triangle_mesh import TriangleMesh
 
@@ -27,11 +27,7 @@ def corner_vertices(mesh: TriangleMesh, joining: np.ndarray) -> np.ndarray:
     are appended at the end.
     """
     pairs = np.concatenate(corners_at(mesh, joining))
-    n_corners = 3 * mesh.n_faces
-    graph = scipy.sparse.coo_array(
-        (np.ones(len(pairs), dtype=bool), tuple(pairs.T)), shape=(n_corners, n_corners)
-    )
-    fan = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    fan = connected_groups(3 * mesh.n_faces, pairs)
 
     _, first_corner, fan = np.unique(fan, return_index=True, return_inverse=True)
     origin = mesh.faces.ravel()[first_corner]

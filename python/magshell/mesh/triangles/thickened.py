@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
+from ..connected import connected_groups
 from .triangle_mesh import TriangleMesh
 
 # [-] Largest offset at a vertex over half the thickness; 2 is exact for two faces whose normals differ by 120 degrees.
@@ -53,9 +53,7 @@ def _corner_points(mesh: TriangleMesh) -> np.ndarray:
         for end in (0, 1)
     ]
     one, other = (np.concatenate([corners[end][side] for end in (0, 1)]) for side in (0, 1))
-    size = 3 * mesh.n_faces
-    graph = scipy.sparse.coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(size, size))
-    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    return connected_groups(3 * mesh.n_faces, np.stack([one, other], axis=1))
 
 
 def _border(mesh: TriangleMesh, faces: np.ndarray) -> np.ndarray:

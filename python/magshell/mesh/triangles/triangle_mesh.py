@@ -6,12 +6,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy
 
 from ... import _core
 from ..._input.arrays import index_array
 from ..._input.quantity import quantity
 from ..._input.scalars import positive
+from ..connected import connected_groups
 from ..mesh_base import MeshBase, frozen
 from ..signed_distance import Distance
 from ..transforms import moved
@@ -122,9 +122,7 @@ class TriangleMesh(MeshBase):
     @cached_property
     def components(self) -> np.ndarray:
         """The number, from 0, of the connected part that each vertex belongs to, (n_v,)."""
-        shape = (self.n_vertices, self.n_vertices)
-        graph = scipy.sparse.coo_array((np.ones(self.n_edges, dtype=bool), tuple(self.edges.T)), shape=shape)
-        return frozen(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])
+        return frozen(connected_groups(self.n_vertices, self.edges))
 
     # Geometry of the reference configuration
 

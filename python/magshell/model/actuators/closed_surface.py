@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...mesh.connected import connected_groups
 from ...mesh.face_shapes import sides
-from ...mesh.topology import FACE_NODES, FACES, groups
+from ...mesh.topology import FACE_NODES, FACES
 from ...mesh.triangles.six_node_checks import rule, shapes
 from ..solids.solid import Solid
 
@@ -117,7 +118,7 @@ def inner_faces(solid: Solid) -> np.ndarray:
     """Return the faces around the only hollow inside a solid. Raises ValueError if there is none, or more than one."""
     mesh = solid.mesh
     ends = mesh.faces[:, [(0, 1), (1, 2)]].reshape(-1, 2)
-    part = groups(mesh.n_vertices, ends)[mesh.faces[:, 0]]
+    part = connected_groups(mesh.n_vertices, ends)[mesh.faces[:, 0]]
     a, b, c = np.moveaxis(mesh.rest_positions[mesh.faces] - mesh.rest_positions.mean(axis=0), 1, 0)
     volumes = {k: float(_det(a[part == k], b[part == k], c[part == k]).sum()) for k in np.unique(part)}
     hollow = [k for k, volume in volumes.items() if volume < 0.0]
@@ -187,7 +188,7 @@ def _lids(rim: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
                 f"open rims of the cavity meet: several edges {name} at vertex {vertex[np.argmax(counts > 1)]} of the scene"
             )
     vertices, numbered = np.unique(rim[:, :2], return_inverse=True)
-    loop = groups(len(vertices), numbered.reshape(-1, 2))
+    loop = connected_groups(len(vertices), numbered.reshape(-1, 2))
     hubs = np.full(loop.max() + 1, np.iinfo(int).max)
     np.minimum.at(hubs, loop, vertices)
     hub = hubs[loop[numbered.reshape(-1, 2)[:, 0]]]

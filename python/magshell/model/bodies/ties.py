@@ -10,6 +10,7 @@ import scipy
 from ..._input.quantity import quantity
 from ..._input.selections import indices, selection
 from ..._runtime.frozen import Frozen
+from ...mesh.connected import connected_groups
 from ...mesh.selection import RELATIVE_TOLERANCE
 from ..shells.shell import Shell
 from ..solids.solid import Solid
@@ -118,7 +119,7 @@ def first_of_welded(count: int, welded: np.ndarray) -> np.ndarray:
     """
     if not len(welded):
         return np.arange(count)
-    groups = _groups(count, welded)
+    groups = connected_groups(count, welded)
     first = np.full(groups.max(initial=-1) + 1, count)
     np.minimum.at(first, groups, np.arange(count))
     return first[groups]
@@ -129,11 +130,5 @@ def joined_components(components: np.ndarray, welded: np.ndarray) -> np.ndarray:
 
     components: (n_v,), those before. welded: (k, 2), pairs of vertices.
     """
-    parts = _groups(int(components.max()) + 1, components[welded])
+    parts = connected_groups(int(components.max()) + 1, components[welded])
     return np.unique(parts[components], return_inverse=True)[1]
-
-
-def _groups(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Return the number of the group of each of `count` items, if pairs (k, 2) of items are in the same group."""
-    graph = scipy.sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]

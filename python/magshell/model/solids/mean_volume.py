@@ -25,7 +25,8 @@ import numpy as np
 
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import MeshQualityWarning
-from ...mesh.topology import FACES, face_table, groups, neighbours
+from ...mesh.connected import connected_groups
+from ...mesh.topology import FACES, face_table, neighbours
 
 if TYPE_CHECKING:
     from ...mesh.tetrahedra.tet_mesh import TetMesh
@@ -88,7 +89,7 @@ def thin_regions(mesh: TetMesh) -> list[np.ndarray]:
     if not len(chosen):
         return []
     table = face_table(mesh.corners[chosen])
-    region = groups(len(chosen), neighbours(table))
+    region = connected_groups(len(chosen), neighbours(table))
     once = table.order[table.first[table.counts == 1]]
     points = mesh.rest_positions[mesh.corners[chosen[once // 4][:, None], FACES[once % 4]]]
     areas = 0.5 * np.linalg.norm(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]), axis=1)
