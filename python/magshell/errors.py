@@ -53,9 +53,9 @@ class MeshGroupWarning(UserWarning):
 class UnitWarning(UserWarning):
     """A warning about a value whose unit is probably wrong, such as mm, kPa or mT given for m, Pa or T.
 
-    It is raised once per scene and kind of value, where a thickness, modulus, density, magnetization or field is orders of
-    magnitude away from that of any real body (the first three on every face). For models without units, switch it off by
-    `warnings.filterwarnings("ignore", category=ms.UnitWarning)`.
+    It is raised once per scene and kind of value, where a thickness, modulus, density, magnetization, field or gravity is
+    orders of magnitude away from that of any real body (the first three on every face), or of any magnetized soft one. For
+    models without units, switch it off by `warnings.filterwarnings("ignore", category=ms.UnitWarning)`.
     """
 
 

@@ -37,6 +37,19 @@ BAD = {
         {"mass_density": 1.1e-9},
         "mass_density [kg/m3] is 1.1e-09, outside of 1e-07 to 1e+06",
     ),
+    "magnetization in kA/m": (
+        {"remanent_magnetization": (62, 0, 0)},
+        "remanent_magnetization [A/m] has entries up to 62, and composites at least 1000: kA/m?",
+    ),
+    "remanence in T": ({"remanent_magnetization": (0, 0, 0.1)}, "ms.magnetization_from_remanence"),
+    "modulus of a composite in MPa": (
+        {"remanent_magnetization": (62e3, 0, 0), "young_modulus": 1.2},
+        "young_modulus [Pa] is 1.2, too little for a body with a magnetization of 62000 A/m: kPa? MPa?",
+    ),
+    "density of a composite in g/cm3": (
+        {"remanent_magnetization": (62e3, 0, 0), "mass_density": 1.86},
+        "mass_density [kg/m3] is 1.86, too little for a body with a magnetization of 62000 A/m: g/cm3?",
+    ),
     "magnetization": (
         {"remanent_magnetization": (0, 0, 4e10)},
         "remanent_magnetization [A/m] has entries up to 4e+10",
@@ -47,17 +60,27 @@ BAD = {
 @pytest.mark.parametrize("values, words", BAD.values(), ids=BAD)
 def test_an_absurd_number_of_a_sheet_is_warned_of_where_its_scene_is_made(values, words):
     (text,) = warned(lambda: scene(**values))
-    assert words in text and text.endswith("? Units are SI")
+    assert words in text and text.endswith(" Units are SI")
 
 
 @pytest.mark.parametrize("unit, key", [("mm?", "thickness"), ("kPa?", "young_modulus"), ("mT?", "field")])
 def test_a_warning_of_units_names_the_unit_that_may_have_been_meant(unit, key):
     if key == "field":
-        there = scene(remanent_magnetization=(1.0, 0, 0))
+        there = scene(remanent_magnetization=(1e4, 0, 0))
         (text,) = warned(lambda: ms.equilibrium(there, applied_flux_density=(0, 0, 60.0)))
     else:
         (text,) = warned(lambda: scene(**{key: {"thickness": 1.0, "young_modulus": 0.02}[key]}))
     assert unit in text
+
+
+def test_a_magnetized_mesh_in_mm_and_gravity_in_mm_are_warned_of():
+    mesh = MESH.scaled(1e3)
+    (text,) = warned(lambda: scene(mesh, thickness=0.5, remanent_magnetization=(62e3, 0, 0)))
+    assert text.startswith("the mesh has a size of 44.7 m, too large for a magnetized soft body: mm?")
+    sheet = ms.Shell(MESH, **USUAL)
+    clamp = ms.Clamp(MESH.edges_at(x=0.0))
+    (text,) = warned(lambda: ms.Scene(sheet, supports=[clamp], gravity=(0, 0, -9810)))
+    assert text == "gravity [m/s2] has a magnitude of 9810, 1e+03 times ours: mm/s2? Units are SI"
 
 
 def test_thickness_beside_the_edges_of_a_fine_mesh_is_warned_of():
@@ -88,7 +111,7 @@ def test_values_of_a_solve_are_warned_of_once_a_scene():
 def test_a_field_of_a_motion_is_warned_of():
     (text,) = warned(
         lambda: ms.simulate(
-            scene(remanent_magnetization=(1e-3, 0, 0)),
+            scene(remanent_magnetization=(1e3, 0, 0)),
             steps=2,
             time_step=1e-3,
             applied_flux_density=lambda t: (0, 0, 1e5 * t),
@@ -117,6 +140,8 @@ SCENES = {
     "a foam": (1e-2, {"mass_density": 5.0}),
     "as good as no mass": (1e-2, {"mass_density": 1e-6}),
     "a model without units": (1.0, {"thickness": 1.0, "young_modulus": 1.0, "mass_density": 1.0}),
+    "a magnetized model without units": (1.0, {"young_modulus": 1.0, "remanent_magnetization": (1, 0, 0)}),
+    "a weak composite": (1e-2, {"remanent_magnetization": (2e3, 0, 0)}),
     "a magnet": (1e-2, {"remanent_magnetization": (0, 0, 1.2e6)}),
 }
 

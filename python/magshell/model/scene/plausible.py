@@ -31,6 +31,15 @@ MOST_MAGNETIZATION = 1e8  # A/m: iron saturates at 1.7e6
 MOST_DEMAGNETIZATION = (
     0.1  # [-] susceptibility times thickness over extent: about the error of the magnetization
 )
+# Narrower limits apply to what is no model without units. Where a modulus is that of a soft body at least, a magnetization
+# below the first limit is none of a composite. A sheet with the magnetization of a composite has its modulus, density and
+# size.
+SOFT_MODULUS = 1e3  # Pa: models without units have 1
+LEAST_MAGNETIZATION = 1e3  # A/m: a silicone with 1 % of iron has 1e4
+COMPOSITE_MODULUS = 100.0  # Pa: gels with particles have 1e3
+COMPOSITE_DENSITY = 20.0  # kg/m3: foams with particles have 100
+COMPOSITE_SIZE = 10.0  # m
+MOST_GRAVITY = 2e3  # m/s2: centrifuges for robots have 1e3
 MOST_FLUX_DENSITY = 30.0  # T: what moves soft robots has 0.1, the strongest magnets of hospitals 12
 
 
@@ -46,10 +55,54 @@ def warn_of_units(scene: Scene, values: Values) -> None:
         )
         density = _held(body, "mass_density")
         _warn_of_range(scene, "mass_density", "kg/m3", density, MASS_DENSITY, "t/mm3?", whose)
+    magnetization = 0.0
     for label, name in scene._value_layout:
         if name == "remanent_magnetization":
             rows = scene._value_layout.of(values.numbers, label, name)
             _warn_of_most(scene, name, "A/m", rows, MOST_MAGNETIZATION, "multiplied by 1000 twice?")
+            magnetization = max(magnetization, float(np.abs(rows).max(initial=0.0)))
+    _warn_of_composites(scene, values, magnetization)
+
+
+def _warn_of_composites(scene: Scene, values: Values, magnetization: float) -> None:
+    """Warn of values that no magnetized soft body has, and of gravity in mm/s2. magnetization: A/m, the largest entry."""
+    moduli = [np.max(held) for body in values.sheets if (held := _held(body, "young_modulus")) is not None]
+    if max(moduli, default=0.0) >= SOFT_MODULUS:
+        if 0.0 < magnetization < LEAST_MAGNETIZATION:
+            text = f"remanent_magnetization [A/m] has entries up to {magnetization:g}, and composites at least 1000"
+            _warn(
+                scene, "remanent_magnetization", text, "kA/m? T, as ms.magnetization_from_remanence converts?"
+            )
+        pull = float(np.linalg.norm(values.gravity))
+        if pull > MOST_GRAVITY:
+            _warn(
+                scene,
+                "gravity",
+                f"gravity [m/s2] has a magnitude of {pull:g}, {pull / 9.81:.3g} times ours",
+                "mm/s2?",
+            )
+    if magnetization < LEAST_MAGNETIZATION:
+        return
+    for k, body in enumerate(values.sheets):
+        whose = f" of body {k}" if len(values.sheets) > 1 else ""
+        of_composites = f", too little for a body with a magnetization of {magnetization:g} A/m"
+        modulus, density = _held(body, "young_modulus"), _held(body, "mass_density")
+        if modulus is not None and (stiffest := float(np.max(modulus))) < COMPOSITE_MODULUS:
+            _warn(
+                scene,
+                "young_modulus",
+                f"young_modulus [Pa]{whose} is {stiffest:g}{of_composites}",
+                "kPa? MPa?",
+            )
+        if density is not None and 0.0 < (heaviest := float(np.max(density))) < COMPOSITE_DENSITY:
+            _warn(
+                scene, "mass_density", f"mass_density [kg/m3]{whose} is {heaviest:g}{of_composites}", "g/cm3?"
+            )
+        if body.mesh.size > COMPOSITE_SIZE:
+            text = (
+                f"the mesh{whose} has a size of {body.mesh.size:.3g} m, too large for a magnetized soft body"
+            )
+            _warn(scene, "size", text, "mm? mesh.scaled(1e-3) converts.")
 
 
 def warn_of_field(scene: Scene, flux_density: np.ndarray) -> None:
