@@ -22,7 +22,7 @@ PaintedTriangles painted(const py::handle& given) {
         for (int k = 0; k < 3; ++k) of_corners[k] = Vec3(colors.data(per_face ? f : faces.at(f, k), 0));
     }
     surface.lit = given["lit"].cast<bool>();
-    surface.smooth = given["smooth"].cast<bool>();
+    surface.crease = given["crease"].cast<double>();
     surface.opacity = given["opacity"].cast<double>();
     return surface;
 }
@@ -54,7 +54,8 @@ void register_picture(py::module_& module) {
         "Paints triangles into an image (height, width, 4). surfaces: dictionaries with positions (n, 3) m "
         "on "
         "the screen "
-        "and in depth, faces, colors, per_face, lit, smooth and opacity. window: (left, right, bottom, top) "
+        "and in depth, faces, colors, per_face, lit, crease (degrees) and opacity. window: (left, right, "
+        "bottom, top) "
         "m.");
 }
 

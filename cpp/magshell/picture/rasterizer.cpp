@@ -8,17 +8,17 @@
 namespace magshell {
 namespace {
 
-constexpr double smooth_below = 0.76604444311897803;  // [-] cosine of 40 degrees
+constexpr double degree = 0.017453292519943295;
 constexpr double overlap = 1e-9;         // [-] of a sample: neighbours share it rather than leave a gap
 constexpr Index band_samples = 1 << 22;  // samples whose depths and colours are in memory at a time
 
 constexpr float nothing = -std::numeric_limits<float>::infinity();  // the depth of the background
 
-// A triangle in samples from the top left corner, with the quantities that vary over it.
+// A triangle in samples from the top left corner, with the colours of its corners from 0 to 255, shading included. Surfaces are
+// matt, so that colours vary nearly linearly over a triangle.
 struct Triangle {
-    std::array<Vec3, 3> corners, normals, colors;
+    std::array<Vec3, 3> corners, colors;
     double opacity, depth;
-    bool lit, plain;  // plain: one normal and one colour for all of it
 };
 
 Vec3 scaled_normal(const std::vector<Vec3>& x, const std::array<Index, 3>& face) {
@@ -35,7 +35,8 @@ std::vector<std::array<Vec3, 3>> corner_normals(const PaintedTriangles& surface)
     }
     std::vector<std::array<Vec3, 3>> normals;
     for (const Vec3& unit : units) normals.push_back({unit, unit, unit});
-    if (!surface.smooth) return normals;
+    if (surface.crease <= 0.0) return normals;
+    const double smooth_below = std::cos(surface.crease * degree);
     std::vector<std::vector<Index>> around(surface.positions.size());
     for (std::size_t f = 0; f < surface.faces.size(); ++f)
         for (const Index vertex : surface.faces[f]) around[vertex].push_back(static_cast<Index>(f));
@@ -49,20 +50,35 @@ std::vector<std::array<Vec3, 3>> corner_normals(const PaintedTriangles& surface)
     return normals;
 }
 
+// Returns the colours from 0 to 255 of the corners of a face, as the light shows its side towards the eye.
+std::array<Vec3, 3> shaded(const std::array<Vec3, 3>& colors, const std::array<Vec3, 3>& normals,
+                           const Vec3& normal, const Lighting* lighting) {
+    std::array<Vec3, 3> out;
+    for (int k = 0; k < 3; ++k) {
+        double light = 1.0;
+        if (lighting) {
+            const double towards = (normal.z() < 0.0 ? -1.0 : 1.0) * normals[k].dot(lighting->direction);
+            light = lighting->ambient + lighting->diffuse * std::max(towards, 0.0);
+        }
+        out[k] = (255.0 * light * colors[k]).cwiseMax(0.0).cwiseMin(255.0);
+    }
+    return out;
+}
+
 // Appends the triangles of a surface that are in the frame.
-void append(const PaintedTriangles& surface, const Frame& frame, std::vector<Triangle>& out) {
+void append(const PaintedTriangles& surface, const Frame& frame, const Lighting& lighting,
+            std::vector<Triangle>& out) {
     const std::vector<std::array<Vec3, 3>> normals = corner_normals(surface);
     const double across = frame.samples * frame.width / (frame.right - frame.left),
                  down = frame.samples * frame.height / (frame.top - frame.bottom);
     const double last_column = frame.samples * frame.width, last_row = frame.samples * frame.height;
     for (std::size_t f = 0; f < surface.faces.size(); ++f) {
-        Triangle triangle{.corners = {},
-                          .normals = normals[f],
-                          .colors = surface.colors[f],
-                          .opacity = surface.opacity,
-                          .depth = 0.0,
-                          .lit = surface.lit,
-                          .plain = false};
+        const Vec3 normal = scaled_normal(surface.positions, surface.faces[f]);
+        Triangle triangle{
+            .corners = {},
+            .colors = shaded(surface.colors[f], normals[f], normal, surface.lit ? &lighting : nullptr),
+            .opacity = surface.opacity,
+            .depth = 0.0};
         Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
         for (int k = 0; k < 3; ++k) {
             const Vec3& x = surface.positions[surface.faces[f][k]];
@@ -72,16 +88,13 @@ void append(const PaintedTriangles& surface, const Frame& frame, std::vector<Tri
             high = high.cwiseMax(triangle.corners[k]);
         }
         if (!(low.x() < last_column && high.x() > 0.0 && low.y() < last_row && high.y() > 0.0)) continue;
-        const auto same = [](const std::array<Vec3, 3>& v) { return v[0] == v[1] && v[0] == v[2]; };
-        triangle.plain = same(triangle.colors) && (!triangle.lit || same(triangle.normals));
         out.push_back(triangle);
     }
 }
 
 class Band {
   public:
-    Band(const Frame& frame, const Lighting& lighting)
-        : frame_(frame), lighting_(lighting), columns_(Index(frame.samples) * frame.width) {}
+    explicit Band(const Frame& frame) : frame_(frame), columns_(Index(frame.samples) * frame.width) {}
 
     // Paints rows of pixels from `first` to `last` - 1, which are white.
     void paint(const std::vector<Triangle>& triangles, int first, int last, std::uint8_t* pixels) {
@@ -104,12 +117,6 @@ class Band {
     }
 
   private:
-    Vec3 shaded(const Vec3& color, Vec3 normal) const {
-        if (normal.z() < 0.0) normal = -normal;
-        const double towards = std::max(normal.dot(lighting_.direction), 0.0);
-        return color * (lighting_.ambient + lighting_.diffuse * towards);
-    }
-
     void fill(const Triangle& triangle) {
         const auto& [a, b, c] = triangle.corners;
         const double area = (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
@@ -120,8 +127,6 @@ class Band {
                   to =
                       std::min(bottom_ - 1,
                                static_cast<int>(std::floor(std::min(high, double(bottom_)) - 0.5 + overlap)));
-        const Vec3 plain =
-            triangle.lit ? shaded(triangle.colors[0], triangle.normals[0]) : triangle.colors[0];
         for (int row = from; row <= to; ++row) {
             // Barycentric coordinates are u_k + v_k x along the row, and all of them positive inside.
             const double y = row + 0.5;
@@ -145,31 +150,57 @@ class Band {
             auto& [leftmost, rightmost] = touched_[row - top_];
             leftmost = std::min(leftmost, begin);
             rightmost = std::max(rightmost, end);
-            for (Index column = begin; column <= end; ++column) {
-                const double x = column + 0.5;
-                const double s = u[0] + v[0] * x, t = u[1] + v[1] * x, r = u[2] + v[2] * x;
-                const float depth = static_cast<float>(s * a.z() + t * b.z() + r * c.z());
-                const std::size_t at = start + column;
-                if (!(depth > depths_[at])) continue;
-                put(triangle, at, depth, triangle.plain ? plain : color_at(triangle, s, t, r));
+            // Depth and colours are linear along the row.
+            const double x = static_cast<double>(begin) + 0.5;
+            const std::array<double, 3> share{u[0] + v[0] * x, u[1] + v[1] * x, u[2] + v[2] * x};
+            const double depth = share[0] * a.z() + share[1] * b.z() + share[2] * c.z(),
+                         deeper = v[0] * a.z() + v[1] * b.z() + v[2] * c.z();
+            const auto& [p, q, r] = triangle.colors;
+            const Vec3 color = share[0] * p + share[1] * q + share[2] * r,
+                       brighter = v[0] * p + v[1] * q + v[2] * r;
+            const Painter painter{depth, deeper, color.cast<float>(), brighter.cast<float>()};
+            if (triangle.opacity >= 1.0)
+                cover(painter, start + begin, end - begin + 1);
+            else
+                blend(painter, start + begin, end - begin + 1, static_cast<float>(triangle.opacity));
+        }
+    }
+
+    // Depth and colour at the first sample of a row, and their changes from one sample to the next.
+    struct Painter {
+        double depth, deeper;
+        Eigen::Vector3f color, brighter;
+    };
+
+    void cover(const Painter& painter, std::size_t first, Index count) {
+        float* depths = depths_.data() + first;
+        std::uint8_t* to = colors_.data() + 3 * first;
+        for (Index n = 0; n < count; ++n, to += 3) {
+            const float depth = static_cast<float>(painter.depth + painter.deeper * static_cast<double>(n));
+            if (!(depth > depths[n])) continue;
+            depths[n] = depth;
+            const float along = static_cast<float>(n);
+            for (int k = 0; k < 3; ++k) to[k] = byte(painter.color[k] + along * painter.brighter[k]);
+        }
+    }
+
+    void blend(const Painter& painter, std::size_t first, Index count, float opacity) {
+        const float* depths = depths_.data() + first;
+        std::uint8_t* to = colors_.data() + 3 * first;
+        for (Index n = 0; n < count; ++n, to += 3) {
+            if (!(static_cast<float>(painter.depth + painter.deeper * static_cast<double>(n)) > depths[n]))
+                continue;
+            const float along = static_cast<float>(n);
+            for (int k = 0; k < 3; ++k) {
+                const float before = to[k], own = painter.color[k] + along * painter.brighter[k];
+                to[k] = byte(before + opacity * (own - before));
             }
         }
     }
 
-    Vec3 color_at(const Triangle& triangle, double s, double t, double r) const {
-        const Vec3 color = s * triangle.colors[0] + t * triangle.colors[1] + r * triangle.colors[2];
-        if (!triangle.lit) return color;
-        const Vec3 normal = s * triangle.normals[0] + t * triangle.normals[1] + r * triangle.normals[2];
-        return shaded(color, normal / std::max(normal.norm(), 1e-30));
-    }
-
-    void put(const Triangle& triangle, std::size_t at, float depth, const Vec3& color) {
-        std::uint8_t* to = colors_.data() + 3 * at;
-        if (triangle.opacity >= 1.0) depths_[at] = depth;
-        for (int k = 0; k < 3; ++k) {
-            const double own = 255.0 * std::clamp(color[k], 0.0, 1.0);
-            to[k] = static_cast<std::uint8_t>(to[k] + triangle.opacity * (own - to[k]) + 0.5);
-        }
+    // Rounds a colour from 0 to 255, which rounding may have moved a little beyond these ends.
+    static std::uint8_t byte(float color) {
+        return static_cast<std::uint8_t>(std::clamp(static_cast<int>(color + 0.5F), 0, 255));
     }
 
     void average(int first, int last, std::uint8_t* pixels) const {
@@ -195,7 +226,6 @@ class Band {
     }
 
     const Frame& frame_;
-    const Lighting& lighting_;
     const Index columns_;
     int top_ = 0, bottom_ = 0;  // the rows of samples
     std::vector<float> depths_;
@@ -210,13 +240,13 @@ std::vector<std::uint8_t> rasterized(std::span<const PaintedTriangles> surfaces,
                                      const Lighting& lighting) {
     std::vector<Triangle> solid, clear;
     for (const PaintedTriangles& surface : surfaces)
-        append(surface, frame, surface.opacity < 1.0 ? clear : solid);
+        append(surface, frame, lighting, surface.opacity < 1.0 ? clear : solid);
     std::ranges::stable_sort(clear, {}, &Triangle::depth);
     solid.insert(solid.end(), clear.begin(), clear.end());
     std::vector<std::uint8_t> pixels(4 * std::size_t(frame.width) * frame.height, 255);
     const Index row_samples = Index(frame.width) * frame.samples * frame.samples;
     const int rows = std::max(1, static_cast<int>(band_samples / row_samples));
-    Band band(frame, lighting);
+    Band band(frame);
     for (int first = 0; first < frame.height; first += rows)
         band.paint(solid, first, std::min(frame.height, first + rows),
                    pixels.data() + 4 * std::size_t(first) * frame.width);

@@ -24,8 +24,8 @@ struct PaintedTriangles {
     std::vector<std::array<Index, 3>> faces;
     std::vector<std::array<Vec3, 3>> colors;  // of the corners of each face
     bool lit = true;
-    bool smooth =
-        false;  // whether normals are averaged over the faces at a vertex that meet at less than 40 degrees
+    double crease =
+        0.0;  // degrees: normals are averaged over the faces at a vertex that meet at a smaller angle
     double opacity = 1.0;
 };
 

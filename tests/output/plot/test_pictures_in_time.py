@@ -54,9 +54,11 @@ def test_a_magnet_of_a_motion_is_where_it_is_then(motion, tmp_path):
         for state, t in zip(states, motion.times, strict=True):
             np.testing.assert_allclose(center(state), there(t).center, atol=1e-12)
             np.testing.assert_allclose(state.sources(PLACE), there(t).flux_density(PLACE), rtol=1e-12)
-    solids = [obstacle_solids([state], 0.02)[-1].positions for state in states_of(motion)]
+    solids = [obstacle_solids([state], 0.02, np.zeros(3))[-1].positions for state in states_of(motion)]
     assert np.abs(solids[2] - solids[0]).max() > 4e-3
-    assert len(obstacle_solids(states_of(motion), 0.02)) == 1 + 3  # the floor once, each place of the magnet
+    assert (
+        len(obstacle_solids(states_of(motion), 0.02, np.zeros(3))) == 1 + 3
+    )  # the floor once, each place of the magnet
 
 
 def test_between_two_states_it_is_on_the_way(motion):

@@ -84,7 +84,7 @@ def test_a_picture_has_them_once():
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=magnet)
     states = states_of(scene)
-    [solid] = obstacle_solids(states * 2, 0.02)
+    [solid] = obstacle_solids(states * 2, 0.02, np.zeros(3))
     assert solid.around and volume((solid.positions, solid.faces)) == pytest.approx(np.pi * 25e-8, rel=0.01)
     picture = ms.plot(scene, width=500, style=ms.Style(backend="matplotlib"))
     without = ms.plot(sheet, width=500, style=ms.Style(backend="matplotlib"))

@@ -10,11 +10,11 @@ pytest.importorskip("matplotlib")
 import magshell as ms
 from magshell import obstacles as ob
 from magshell.output.plot.frames import Scenery
-from magshell.output.plot.panels import Options
+from magshell.output.plot.panels import Options, draw
 from magshell.output.plot.surroundings import REACH, obstacle_solids
-from magshell.output.plot.view import view_of
+from magshell.output.plot.view import View, view_of
 from magshell.output.results.state import states_of
-from magshell.output.results.units import LengthUnit
+from magshell.output.results.units import LengthUnit, length_unit
 
 MESH = ms.meshes.rectangle(0.1, 0.04, cells=(10, 4))
 
@@ -29,7 +29,7 @@ def image(*, color=None, obstacles=(), view=(0, -90), **options):
 def test_a_plane_lies_where_the_sheet_is():
     floor = ob.Plane(center=(7.0, 3.0, -0.01))
     state = states_of(MESH, obstacles=floor)[0]
-    (solid,) = obstacle_solids([state], 0.1)
+    (solid,) = obstacle_solids([state], 0.1, state.positions.mean(axis=0))
     assert solid.opacity < 1
     np.testing.assert_allclose(solid.positions[:, 2], -0.01, atol=1e-12)
     np.testing.assert_allclose(
@@ -50,7 +50,7 @@ def test_a_moving_obstacle_is_drawn_in_each_state_and_one_at_rest_once():
     falling = ob.Sphere(0.01, motion=lambda t: [0, 0, -t])
     start = states_of(MESH, obstacles=[falling, ob.Plane()])[0]
     states = [replace(start, time=time) for time in (0.0, 0.5)]
-    first, plane, second = obstacle_solids(states, 0.1)
+    first, plane, second = obstacle_solids(states, 0.1, start.positions.mean(axis=0))
     np.testing.assert_allclose(
         second.positions - first.positions, np.broadcast_to([0, 0, -0.5], first.positions.shape)
     )
@@ -135,3 +135,19 @@ def test_legend_stays_clear_of_the_colour_bar(width):
     key = next(box for text, box in boxes.items() if "up to" in text)
     assert key.x1 <= bar.x0 or key.y0 >= bar.y1  # beside it, or in a row above
     assert all(0 <= box.x0 and box.x1 <= width for box in boxes.values())
+
+
+def test_a_floor_stays_where_it_is_while_the_sheet_moves():
+    """Compare panels of a sheet that moves along a floor: its line has the same ends in all of them."""
+    moved = MESH.rest_positions + np.arange(3)[:, None, None] * np.array([0.05, 0, 0])
+    states = states_of(MESH, positions=moved, obstacles=ob.Plane())
+    view = View(0.0, -90.0)
+    panels = draw(
+        [[each] for each in states], ["a", "b", "c"], None, view, length_unit(0.1), Options()
+    ).panels
+    [first], [second], [third] = (
+        [solid.positions for solid in panel.solids if solid.around] for panel in panels
+    )
+    np.testing.assert_array_equal(first, second)
+    np.testing.assert_array_equal(first, third)
+    assert first[:, 0].min() < moved[0, :, 0].min() and first[:, 0].max() > moved[2, :, 0].max()

@@ -17,7 +17,7 @@ def surface(points, faces, color, **more):
         "colors": np.tile(np.asarray(color, dtype=float), (len(faces), 1)),
         "per_face": True,
         "lit": False,
-        "smooth": False,
+        "crease": 0.0,
         "opacity": 1.0,
         **more,
     }
@@ -96,7 +96,7 @@ def test_smooth_surfaces_keep_their_sharp_edges() -> None:
             (1.5, 0.8, 0),
         ]
         faces = [(0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4)]
-        image = painted(surface(points, faces, (0.9, 0.9, 0.9), lit=True, smooth=True))
+        image = painted(surface(points, faces, (0.9, 0.9, 0.9), lit=True, crease=40.0))
         flat = 0.9 * (0.6 + 0.4 / np.hypot(1.0, 2 * rise))
         ridge, slope = image[50, 99, 0], image[50, 52, 0]
         assert abs(slope - flat) < 0.01

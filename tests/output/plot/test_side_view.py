@@ -24,7 +24,7 @@ SIZE = 0.05  # [m]
 
 def floor_of(view, floor=FLOOR):
     states = states_of(MESH, obstacles=floor)
-    [solid] = obstacle_solids(states, SIZE, eye=view_of(states, view).axes[2])
+    [solid] = obstacle_solids(states, SIZE, states[0].positions.mean(axis=0), view_of(states, view).axes[2])
     return solid
 
 

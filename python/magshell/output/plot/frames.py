@@ -134,7 +134,11 @@ class Scenery:
 
 
 class Reel:
-    """A context manager that paints drawings one after the other, with the layout of the first one."""
+    """A context manager that paints drawings one after the other, with the layout and the legend of the first one.
+
+    The legend is drawn once. matplotlib takes longer to lay out axes than to draw what is in them, so that the contents of
+    the panel are drawn one by one over it.
+    """
 
     def __init__(self, first: Drawing, width: int, backend: str):
         self._figure = paint(first, width, 1, backend, DPI).figure
@@ -142,6 +146,10 @@ class Reel:
         self._window = np.array([*self._axes.get_xlim(), *self._axes.get_ylim()])
         self._title, self._ruler = title_height(self._axes), Ruler(DPI)
         self._screens = screen_of(self._axes, backend, samples=False)
+        self._axes.clear()
+        self._axes.set_axis_off()
+        self._figure.canvas.draw()
+        self._legend = self._figure.canvas.copy_from_bbox(self._figure.bbox)
 
     def __enter__(self) -> Reel:
         self._screen = self._screens.__enter__()
@@ -152,10 +160,20 @@ class Reel:
 
     def image(self, drawing: Drawing) -> np.ndarray:
         """Paint a drawing as an image (height, width, 3) uint8, with an even height and width as movies need."""
-        self._axes.clear()
+        axes, canvas = self._axes, self._figure.canvas
+        for artist in self._contents():
+            artist.remove()
+        axes.set_title("")
         panel, room = drawing.panels[0], (self._title, self._ruler)
-        paint_panel(self._axes, panel, drawing, self._window, self._screen, *room)
-        self._figure.canvas.draw()
-        image = np.asarray(self._figure.canvas.buffer_rgba())[:, :, :3]
+        paint_panel(axes, panel, drawing, self._window, self._screen, *room)
+        canvas.restore_region(self._legend)
+        for artist in sorted([*self._contents(), axes.title], key=lambda each: each.get_zorder()):
+            artist.draw(canvas.get_renderer())
+        image = np.asarray(canvas.buffer_rgba())[:, :, :3]
         odd = [(0, image.shape[k] % 2) for k in (0, 1)]
         return np.pad(image, [*odd, (0, 0)], constant_values=255)
+
+    def _contents(self) -> list[Any]:
+        """Return what was painted into the panel."""
+        axes = self._axes
+        return [*axes.collections, *axes.patches, *axes.lines, *axes.images, *axes.texts]

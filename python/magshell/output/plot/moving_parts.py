@@ -13,10 +13,10 @@ from ..results.units import length_unit
 from . import colors
 from .panels import size_of
 from .playback import same_faces, speed_of
-from .solids import Solid, sheet
+from .solids import Solid
 from .style import colored
 from .surfaces import on_surfaces, scalar_on_surfaces
-from .surroundings import obstacle_solids
+from .surroundings import inner_solids, obstacle_solids
 
 if TYPE_CHECKING:
     from ..._input.kinds import Fielded, Numbers, Shown
@@ -103,14 +103,11 @@ def _solids(state: State, size: float, middle: np.ndarray) -> list[tuple[str, So
     """Return the surfaces around the bodies of a state, with their kinds: obstacles, magnets, links, tendons,
     springs, shapes.
     """
-    kinds = (("link", state.links, colors.LINK), ("tendon", state.tendons, colors.TENDON))
-    kinds += (("spring", state.springs, colors.SPRING), ("rigid_body", state.shapes, colors.LINK))
     around = [
         ("magnet" if each.opacity == 1.0 else "obstacle", each)
         for each in obstacle_solids([state], size, middle)
     ]
-    inside = [(name, sheet(*each, colors.rgb(code))) for name, surfaces, code in kinds for each in surfaces]
-    return around + inside
+    return around + inner_solids(state)
 
 
 def _shown_at(states: list[State], speed: float) -> np.ndarray:

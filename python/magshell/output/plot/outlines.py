@@ -1,4 +1,4 @@
-"""The edges of bodies that pictures show as lines: borders, sharp edges, and silhouettes of closed surfaces."""
+"""The edges of bodies that pictures show as lines from every side: borders and sharp edges."""
 
 from __future__ import annotations
 
@@ -32,21 +32,13 @@ def outline_edges(mesh: TriangleMesh) -> np.ndarray:
     return np.sort(np.concatenate([mesh.boundary_edges, creases, sharp[_without_ends(mesh.edges[sharp])]]))
 
 
-def silhouette_edges(state: State, eye: np.ndarray) -> np.ndarray:
-    """Return the numbers of the edges of closed surfaces between a face towards the eye and one away from it."""
-    mesh, interior = state.mesh, state.mesh.interior_edges
-    closed = interior[of_closed(mesh)[interior]]
-    towards = _towards(state, eye)[mesh.edge_faces[closed]]
-    return closed[towards[:, 0] != towards[:, 1]]
-
-
 def seen(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
     """Return those of the edges (k,) that are not on the far side of a closed surface.
 
     Lines are lifted towards the eye, so those on the far side would be visible through the surface.
     """
     mesh = state.mesh
-    hidden = of_closed(mesh)[edges] & ~_towards(state, eye)[mesh.edge_faces[edges]].any(axis=1)
+    hidden = of_closed(mesh)[edges] & ~towards_eye(state, eye)[mesh.edge_faces[edges]].any(axis=1)
     return edges[~hidden]
 
 
@@ -56,7 +48,7 @@ def of_closed(mesh: TriangleMesh) -> np.ndarray:
     return ~np.isin(of_edge, of_edge[mesh.boundary_edges])
 
 
-def _towards(state: State, eye: np.ndarray) -> np.ndarray:
+def towards_eye(state: State, eye: np.ndarray) -> np.ndarray:
     """Return whether the outer side of each face is towards the eye, (n_f,) bool; for closed surfaces."""
     mesh = state.mesh
     x0, x1, x2 = np.moveaxis(state.positions[mesh.faces], 1, 0)

@@ -13,10 +13,11 @@ from . import colors, glyphs
 from .colors import Scalar, rgb
 from .cuts import Cut, Section, cut_edges, opened, section_solid
 from .limits import arrow_count
-from .outlines import outline_edges, seen, silhouette_edges
+from .outlines import outline_edges, seen
+from .silhouettes import silhouettes
 from .solids import Solid, arrows, ribbons, sheet
 from .style import Style
-from .surroundings import box_of, obstacle_solids
+from .surroundings import box_of, inner_solids, obstacle_solids
 from .thick import thick_skins
 from .view import View
 
@@ -24,6 +25,7 @@ LINE = 0.0022  # [-] width of lines over the size of the drawing
 LONGEST_FIELD = 0.2  # [-] longest arrow of a uniform field over the size of the drawing
 LONGEST_CONTACT = 0.12  # [-] longest arrow of a contact force over the size of the drawing
 FLESH = 0.45  # [-] opacity of bodies with links or tendons inside
+MOST_ARROWS = 4  # uniform fields in a panel that are drawn side by side; more are a fan
 PALEST = 0.8  # [-] fraction of white in the first of many states that fade
 
 
@@ -112,6 +114,9 @@ def draw(
     """Draw one panel per group of states; the states of a group lie over each other."""
     states = [state for group in groups for state in group]
     size = size_of(states)
+    middle = np.concatenate([state.positions for state in states]).mean(
+        axis=0
+    )  # the same floor in all panels
     legend: list[tuple[str, str]] = []
     panels = []
     for number, group in enumerate(groups):
@@ -127,7 +132,7 @@ def draw(
                 solids += _section_solids(state, first + index, scalar, view, size, options)
                 solids = [each for each in solids if len(each.faces)]
             panel.solids += _pale(solids, paleness)
-        panel.solids += obstacle_solids(group, size, eye=view.axes[2])
+        panel.solids += obstacle_solids(group, size, middle, view.axes[2])
         if len(group) > 1:
             labels = _series_labels(group, titles, view)
             panel.labels += _apart(labels, view, 0.1 * size) if options.fade else labels
@@ -163,22 +168,18 @@ def sheet_solids(state: State, shades: np.ndarray, view: View, size: float, opti
     skins, border = [sheet(state.positions, mesh.faces, shades)], None
     if options.thickness and state.thickness is not None:
         skins, border = thick_skins(state, shades)
-    links = [sheet(*each, rgb(colors.LINK)) for each in state.links]
-    inside = [*links, *(sheet(*each, rgb(colors.TENDON)) for each in state.tendons)]
-    shapes = [sheet(*each, rgb(colors.LINK)) for each in state.shapes]
-    shapes += [sheet(*each, rgb(colors.SPRING)) for each in state.springs]
-    skins = [replace(skin, opacity=FLESH) for skin in skins] if inside else skins
-    solids = [*inside, *shapes, *skins]
+    if state.links or state.tendons:
+        skins = [replace(skin, opacity=FLESH) for skin in skins]
+    solids = [*(solid for _, solid in inner_solids(state)), *skins]
     if options.mesh_lines:
         edges = mesh.edges[seen(state, np.arange(mesh.n_edges), eye)]
         solids.append(ribbons(state.positions[edges], eye, 0.5 * LINE * size, colors.OUTLINE, 0.6 * step))
     lines = outline_edges(mesh)
     if border is not None:
         solids.append(ribbons(border, eye, LINE * size, colors.OUTLINE, 0.2 * step))
-    shown = np.union1d(seen(state, lines, eye), silhouette_edges(state, eye)) if border is None else lines[:0]
-    if len(shown):
-        contours = state.positions[mesh.edges[shown]]
-        solids.append(ribbons(contours, eye, LINE * size, colors.OUTLINE, 0.8 * step))
+    if border is None:
+        contours = [state.positions[mesh.edges[seen(state, lines, eye)]], silhouettes(state, eye)]
+        solids.append(ribbons(np.concatenate(contours), eye, LINE * size, colors.OUTLINE, 0.8 * step))
     if len(state.creases):
         creases = state.positions[np.asarray(state.creases)]
         solids.append(ribbons(creases, eye, 1.4 * LINE * size, colors.CREASE, 0.8 * step))
@@ -241,7 +242,7 @@ def _uniform_fields(
     for panel, group in zip(panels, groups, strict=True):
         fields = _distinct([s.flux_density for s in group if s.flux_density is not None])
         x = left - 0.07 * size
-        if options.fade and len(fields) > 1:
+        if len(fields) > (1 if options.fade else MOST_ARROWS):
             _fan(panel, np.array(fields), scale, x * right + middle[1] * up + middle[2] * eye, view, size)
             fields = []
         for flux_density in fields:

@@ -143,13 +143,14 @@ def paint(drawing: Drawing, width: int, columns: int | None, backend: str, dpi: 
 
 @contextmanager
 def screen_of(axes: Axes, backend: str, samples: bool = True) -> Iterator[Screen]:
-    """Open what a panel is painted on before it is copied to the axes."""
+    """Open what a panel is painted on before it is copied to the axes. samples: whether edges are smooth as in pictures."""
     box = axes.get_window_extent()
     pixels = round(box.width), round(box.height)
     if backend == "pyvista":
         screen = vtk.Screen(pixels, samples)
     else:
-        screen = raster.Screen(pixels) if backend == "magshell" else polygons.Screen()
+        finely = raster.SAMPLES if samples else raster.MOVIE_SAMPLES
+        screen = raster.Screen(pixels, finely) if backend == "magshell" else polygons.Screen()
     try:
         yield screen
     finally:

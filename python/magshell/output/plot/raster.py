@@ -17,14 +17,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.image import AxesImage
 
-SAMPLES = 3  # along each side of a pixel
+SAMPLES = 3  # along each side of a pixel of a picture
+MOVIE_SAMPLES = 2  # of a movie, in which 150 frames must not take long
+CREASE = 40.0  # degrees between faces of a smooth surface, above which an edge is sharp
 
 
 class Screen:
     """An image of so many pixels (width, height) that panels are painted into."""
 
-    def __init__(self, pixels: tuple[int, int]):
-        self.pixels = pixels
+    def __init__(self, pixels: tuple[int, int], samples: int = SAMPLES):
+        self.pixels, self.samples = pixels, samples
 
     def close(self) -> None:
         """Close nothing: it holds no window."""
@@ -38,7 +40,7 @@ class Screen:
             [_as_input(solid, view) for solid in panel.solids if len(solid.faces)],
             [float(each) for each in window],
             *self.pixels,
-            samples=SAMPLES,
+            samples=self.samples,
             light=LIGHT.tolist(),
             ambient=AMBIENT,
             diffuse=DIFFUSE,
@@ -78,6 +80,6 @@ def _as_input(solid: Solid, view: View) -> dict[str, object]:
         "colors": np.ascontiguousarray(solid.colors, dtype=np.float64),
         "per_face": solid.per_face,
         "lit": solid.lit,
-        "smooth": solid.smooth,
+        "crease": CREASE if solid.smooth else 0.0,
         "opacity": float(solid.opacity),
     }

@@ -1,4 +1,4 @@
-"""The surroundings of bodies in a picture: obstacles as transparent solids, and magnets."""
+"""The surroundings of bodies in a picture: obstacles as transparent solids, magnets, and what bodies carry."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ ROOM = 0.15  # [-] distance from the bodies up to which such an obstacle is show
 
 
 def obstacle_solids(
-    states: list[State], size: float, middle: np.ndarray | None = None, eye: np.ndarray | None = None
+    states: list[State], size: float, middle: np.ndarray, eye: np.ndarray | None = None
 ) -> list[Solid]:
     """Return the obstacles and magnets of states in one panel; those that do not move appear once.
 
-    size: of the drawing, m. middle: (3,) m, the point around which the square of a plane lies; by default the mean position
-    of each state. eye: (3,), the direction of the eye; a plane seen edge-on is a hatched line then.
+    size: of the drawing, m. middle: (3,) m, the point around which the square of a plane lies. eye: (3,), the direction of
+    the eye; a plane seen edge-on is a hatched line then.
     """
     shown = {}
     for state in states:
@@ -34,11 +34,10 @@ def obstacle_solids(
         for obstacle in state.obstacles:
             key = (id(obstacle), None if obstacle.motion is None else time)
             if key not in shown:
-                near = state.positions.mean(axis=0) if middle is None else middle
-                if eye is not None and (line := _ground_line(obstacle, time, near, size, eye)) is not None:
+                if eye is not None and (line := _ground_line(obstacle, time, middle, size, eye)) is not None:
                     shown[key] = line
                     continue
-                vertices, faces = obstacle.surface(time, extent=REACH * size, around=near)
+                vertices, faces = obstacle.surface(time, extent=REACH * size, around=middle)
                 surface = sheet(vertices, faces, colors.rgb(colors.OBSTACLE))
                 shown[key] = replace(surface, opacity=OPACITY, around=True)
     for state in states:
@@ -47,6 +46,17 @@ def obstacle_solids(
             surface = sheet(points, faces, colors.rgb(colors.MAGNET))
             shown.setdefault(key, replace(surface, around=True, smooth=False))  # blocks have sharp edges
     return list(shown.values())
+
+
+def inner_solids(state: State) -> list[tuple[str, Solid]]:
+    """Return the links, tendons, springs and free rigid bodies of a state, each with its kind."""
+    kinds = (
+        ("link", state.links, colors.LINK),
+        ("tendon", state.tendons, colors.TENDON),
+        ("spring", state.springs, colors.SPRING),
+        ("rigid_body", state.shapes, colors.LINK),
+    )
+    return [(name, sheet(*each, colors.rgb(code))) for name, surfaces, code in kinds for each in surfaces]
 
 
 def _ground_line(
