@@ -50,6 +50,11 @@ def _meshes_and_pictures(s: Sample) -> Iterator[Call]:
         {"path": s.folder / "out.ply", "mesh": s.mesh, "positions": s.positions, **fields},
     )
     states = {"positions": np.stack([s.positions] * 2), "times": (0.0, 1.0)}
+    probes = {"what": s.rest, "probes": [ms.Probe("tip", [0])]}
+    series = {"path": s.folder / "probed.pvd", **probes, "progress": False}
+    yield Call("write_series of probes", ms.write_series, series, cost=3)
+    page = {"path": s.folder / "probed.html", **probes}
+    yield Call("write_page of probes", ms.write_page, page, cost=10)
     yield Call(
         "write_series",
         ms.write_series,

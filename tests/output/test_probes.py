@@ -140,6 +140,79 @@ def test_curves_against_time_and_each_other(results):
         ms.plot_history(results["rest"], "tip.z", probes=probes)
 
 
+@pytest.mark.parametrize("name", ["cases", "path", "move"])
+def test_results_with_several_states_have_plot_history_as_a_method(name, results):
+    picture = results[name].plot_history("tip.z", probes=PROBES[0])
+    wanted = ms.plot_history(results[name], "tip.z", probes=PROBES[0])
+    assert picture._repr_png_(60) == wanted._repr_png_(60)
+
+
+@pytest.mark.parametrize("name", ["cases", "path"])
+def test_field_along_the_horizontal_axis_is_what_changes_of_it(name, results):
+    axes = results[name].plot_history("tip.z", against="field", probes=PROBES[0]).figure.axes[0]
+    assert axes.get_xlabel() == "applied_flux_density z [T]"
+    ends = {"cases": [1e-3, 2e-3], "path": [1e-3, 3e-3]}[name]
+    np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], ends, rtol=1e-12)
+
+
+def cases_in(fields, **more) -> ms.EquilibriumSet:
+    solved = [ms.equilibrium(SCENE, **GIVEN, applied_flux_density=each, **more) for each in fields]
+    return ms.EquilibriumSet(solved)
+
+
+def test_field_on_a_line_has_a_sign_and_others_their_magnitude() -> None:
+    line = cases_in([(-1e-3, 0, -1e-3), (0, 0, 0), (2e-3, 0, 2e-3)])
+    axes = line.plot_history("bending_energy", against="field").figure.axes[0]
+    assert "along its line" in axes.get_xlabel()
+    np.testing.assert_allclose(
+        axes.lines[0].get_xdata(), np.sqrt(2) * 1e-3 * np.array([-1, 0, 2]), atol=1e-15
+    )
+    curve = cases_in([(1e-3, 0, 0), (1e-3, 0, 1e-3), (0, 0, 3e-3)])
+    axes = curve.plot_history("bending_energy", against="field").figure.axes[0]
+    np.testing.assert_allclose(axes.lines[0].get_xdata(), [1e-3, np.sqrt(2) * 1e-3, 3e-3], rtol=1e-12)
+    with pytest.raises(ValueError, match="the field turns and keeps its magnitude"):
+        cases_in([(1e-3, 0, 0), (0, 0, 1e-3)]).plot_history("bending_energy", against="field")
+    with pytest.raises(ValueError, match="needs a field that changes"):
+        cases_in([(1e-3, 0, 0), (1e-3, 0, 0)]).plot_history("bending_energy", against="field")
+
+
+def test_factor_on_a_magnet_is_what_changes_of_its_field() -> None:
+    magnet = ms.Dipoles([[0.05, 0.005, -0.05]], [[0.0, 0.0, 1.0]])
+    scene = ms.Scene(SHEET, supports=[CLAMP], field=magnet, gravity=(0, 0, -9.81))
+    path = ms.follow_path(scene, **GIVEN, start=ms.equilibrium(scene, **GIVEN, field_factor=0.0))
+    axes = path.plot_history("tip.z", against="field", probes=PROBES[0]).figure.axes[0]
+    assert axes.get_xlabel() == "field_factor [1]"
+    np.testing.assert_allclose(axes.lines[0].get_xdata(), path.parameters, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["rest", "cases", "path", "move"])
+def test_probes_are_field_data_of_a_series(name, results, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    pytest.importorskip("meshio")
+    table = ms.to_pandas(results[name], probes=PROBES[:4])
+    ms.write_series(tmp_path / "a.pvd", results[name], probes=PROBES[:4])
+    files = sorted((tmp_path / "a").iterdir())
+    assert len(files) == len(table)
+    for file, (_, row) in zip(files, table.iterrows(), strict=True):
+        found = pyvista.read(file).field_data
+        for column in ("tip.z [m]", "hold.z [N]", "span [m]"):
+            np.testing.assert_array_equal(found[column], [row[column]])
+    again = ms.read_mesh(files[-1])
+    assert again.n_faces == MESH.n_faces
+
+
+def test_probes_of_a_series_need_a_result_and_its_own_states(results, tmp_path):
+    with pytest.raises(ValueError, match="probes are of one result, got a TriangleMesh"):
+        ms.write_series(tmp_path / "a.pvd", MESH, probes=PROBES[0])
+    with pytest.raises(ValueError, match="leave out positions="):
+        ms.write_series(
+            tmp_path / "a.pvd", results["move"], positions=results["move"].positions, probes=PROBES[0]
+        )
+    with pytest.raises(ValueError, match="probes must be"):
+        ms.write_series(tmp_path / "a.pvd", results["move"], probes="tip")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_points_between_vertices_are_interpolated_in_their_element() -> None:
     mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)

@@ -1,4 +1,4 @@
-"""Mixins that give results, scenes and meshes the methods plot(), save() and animate().
+"""Mixins that give results, scenes and meshes the methods plot(), save(), plot_history() and animate().
 
 The functions behind them belong to packages that import this one; they register themselves here when they are
 imported.
@@ -48,7 +48,15 @@ class SaveMixin(PlotMixin):
         _FUNCTIONS["save"](path, self)
 
 
-class AnimateMixin(SaveMixin):
+class HistoryMixin(SaveMixin):
+    """A mixin for results with several states."""
+
+    def plot_history(self, columns: Any, **options: Any) -> Any:
+        """Draw columns of the table of this result as curves: ms.plot_history(self, columns, ...), with its keywords."""
+        return _FUNCTIONS["plot_history"](self, columns, **options)
+
+
+class AnimateMixin(HistoryMixin):
     """A mixin for results with a sequence of states."""
 
     def animate(self, path: Any, **options: Any) -> Any:

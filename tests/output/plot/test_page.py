@@ -166,6 +166,24 @@ def test_long_motions_are_kept_within_a_limit(mesh, tmp_path) -> None:
     assert kept[0] == kept[1] == 41 and 2 <= kept[2] < 20
 
 
+def test_curves_of_probes_hold_every_recorded_state(mesh, tmp_path) -> None:
+    move = lifted_strip(mesh, steps=40)
+    probe = ms.Probe("tip", mesh.vertices_at(x=0.1))
+    page = Page(ms.write_page(move, tmp_path / "a.html", probes=probe, size_limit=25e3).read_text())
+    history = page.data["history"]
+    assert len(page.data["states"]) < 41 and {"history", "column", "curve"} <= set(page.ids)
+    assert [each["name"] for each in history["columns"]] == ["tip.x [m]", "tip.y [m]", "tip.z [m]"]
+    assert history["along"]["name"] == "time [s]"
+    np.testing.assert_array_equal(numbers(history["along"]["values"], "<f4"), move.times.astype("<f4"))
+    wanted = move.displacements[:, mesh.vertices_at(x=0.1), 2].mean(axis=1)
+    np.testing.assert_array_equal(numbers(history["columns"][2]["values"], "<f4"), wanted.astype("<f4"))
+    for number, state in zip(history["numbers"], page.data["states"], strict=True):
+        assert state["time"] == move.times[number]
+    assert Page(ms.write_page(move, tmp_path / "b.html").read_text()).data["history"] is None
+    with pytest.raises(ValueError, match="probes are of one result, got a TriangleMesh"):
+        ms.write_page(mesh, tmp_path / "c.html", probes=probe)
+
+
 def test_a_page_needs_no_network(mesh, path_, tmp_path) -> None:
     text = ms.write_page(mesh, tmp_path / "a.html", **path_).read_text()
     assert Page(text).links == []

@@ -25,7 +25,7 @@ def shown(data: dict, state: int) -> list[np.ndarray]:
     """Return the positions at which the page's script draws each surface."""
     found = []
     for each in data["states"][state].get("around", []):
-        points = numbers(data["around"][each["surface"]]["positions"])
+        points = numbers(each.get("positions", data["around"][each["surface"]]["positions"]))
         if "place" in each:
             place = numbers(each["place"])
             points = points @ place[:3].T + place[3]
@@ -104,3 +104,22 @@ def test_free_rigid_parts_are_drawn(tmp_path) -> None:
     assert len(data["around"]) == 1
     fallen = [shown(data, k)[0][:, 2].mean() for k in range(3)]
     assert fallen[0] > fallen[1] > fallen[2]
+
+
+def test_springs_and_creases_are_on_the_page(tmp_path) -> None:
+    crease = ms.Crease(MESH.edges_at(x=0.02), stiffness=1e-4)
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=2e3, creases=[crease])
+    spring = ms.Spring((sheet, (0.04, 0.005, 0.0)), (0.04, 0.005, 0.03), stiffness=0.05)
+    clamp = ms.Clamp(MESH.edges_at(x=0.0))
+    scene = ms.Scene(sheet, supports=[clamp], loads=[spring], gravity=(0, 0, -9.81))
+    fall = ms.simulate(scene, steps=3, time_step=5e-3, progress=False)
+    data = data_of(ms.write_page(fall, tmp_path / "a.html"))
+    assert len(data["around"]) == 1 and data["flesh"] == 1.0
+    for k, state in enumerate(states_of(fall)):
+        [(points, _)] = state.springs
+        np.testing.assert_allclose(shown(data, k)[0], points, atol=1e-8)
+    pairs = np.frombuffer(base64.b64decode(data["creases"]), "<u4").reshape(-1, 2)
+    wanted = MESH.edges[MESH.edges_at(x=0.02)]
+    np.testing.assert_array_equal(np.sort(pairs, axis=1), np.sort(wanted, axis=1))
+    few = data_of(ms.write_page(fall, tmp_path / "b.html", size_limit=8e3))
+    assert len(few["states"]) < 4  # positions of springs count

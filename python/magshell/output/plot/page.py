@@ -17,6 +17,7 @@ import numpy as np
 from ..._input.scalars import positive
 from ..._runtime.files import replace_file
 from ..._runtime.solver_entry_point import grouped
+from ..results.probes import Probe
 from ..results.state import State, states_of, with_times
 from ..results.units import LengthUnit, length_unit, prefixed, with_unit
 from . import colors, glyphs
@@ -24,8 +25,9 @@ from .colors import Scalar, scalar_of
 from .drawing import checked_titles
 from .limits import arrow_count
 from .outlines import outline
+from .page_history import page_history
 from .page_surroundings import PageSurroundings
-from .panels import size_of
+from .panels import FLESH, size_of
 from .playback import SAMPLES, evenly_spaced, same_faces, speed_of
 from .solids import Solid
 from .style import Color, Style, colored, style_of
@@ -54,6 +56,7 @@ def write_page(
     title: str = "magshell",
     speed: float | None = None,
     size_limit: float = 10e6,
+    probes: Probe | Sequence[Probe] = (),
     style: Style | None = None,
 ) -> Path:
     """Write an HTML page that shows bodies from all sides, with their magnetization and the field; it works offline.
@@ -61,7 +64,8 @@ def write_page(
     The reader drags to rotate, scrolls or pinches to zoom, and shift-drags to move. The states of a path or a motion can be
     played and chosen by a slider; a motion starts by itself. The reader chooses the colours: magnetization, displacement,
     and the quantity that `color` (a name or arrays, as in `plot`) adds. Obstacles, magnets and wires of fields, magpylib's
-    as well, and free rigid bodies are shown at their positions in each state.
+    as well, free rigid bodies, links, tendons, springs and creases are shown at their positions in each state; bodies with
+    links or tendons inside are transparent.
 
     what, obstacles: as in `plot`, but all states must have the same mesh. titles: one per state. title: that of the page.
     positions, remanent_magnetization, applied_flux_density, field, view: as in `plot`.
@@ -71,6 +75,8 @@ def write_page(
     size_limit: bytes for the states. They are stored in float32 (16 bytes per vertex for the positions, 6 for a scalar that
         changes) if they fit, else in 16 bits (half the size, accurate to 1/65000 of the shape's size), else as many evenly
         spaced states as fit; the page says how many there were. The mesh takes about 85 bytes per vertex, the viewer 25 kB.
+    probes: of a result; the page draws a curve of each ms.Probe over the states, with the number of the state that is shown.
+        The reader chooses a column of them, and a state by a click on the curve.
     style: as in `plot`; the reader can show and hide the rest shape and the mesh lines. A page does not show contacts.
 
     Raises ValueError on bad input, FileNotFoundError if the folder does not exist.
@@ -119,24 +125,30 @@ def write_page(
         states = [replace(state, flux_density=None, fields=()) for state in states]
     fields = _sources(states, size)
     numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))
-    numbers += 20 * max(map(len, surroundings.poses))
+    numbers += surroundings.numbers_per_state
     numbers += max((6 * len(field.starts) for field in fields[0] if field is not None), default=0)
+    history = page_history(what, probes, positions)
+    if history is not None:  # curves have four bytes a number
+        size_limit = max(size_limit - 16 / 3 * len(states) * (1 + len(history[2])), 1.0)
     dtype, chosen = _choose_states(len(states), numbers, size_limit)
     seen = view_of(states, view)
     data = {
         "view": [seen.elevation, seen.azimuth],
         "size": size,
         "unit": unit._asdict(),
-        "palette": {"sheet": colors.SHEET, "field": colors.FIELD},
+        "palette": {"sheet": colors.SHEET, "field": colors.FIELD, "crease": colors.CREASE},
         "faces": _packed(mesh.faces, "<u4"),
         "outline": _packed(outline(mesh), "<u4"),
         "edges": _packed(mesh.edges, "<u4"),
+        "creases": _packed(np.asarray(states[0].creases, dtype=np.int64), "<u4"),
+        "flesh": FLESH if any(state.links or state.tendons for state in states) else 1.0,
         "rest": _packed(mesh.rest_positions, "<f4"),
         "scalars": [_scalar(s, chosen, dtype) for s in scalars],
         "states": _states(states, chosen, titles, fields, count, dtype, surroundings),
         "around": [_surface(each) for each in surroundings.surfaces],
         "window": _window(surroundings.window(states, seen)),
         "recorded": len(states),
+        "history": _history(history, chosen),
         "shown": {"rest": style.rest, "edges": style.mesh_lines},
         "speed": None if states[0].time is None else speed,
     }
@@ -238,8 +250,10 @@ def _states(
             one["fieldLabel"] = f"field, full length at {with_unit(full_length, 'T')}"
         if surroundings.poses[k]:
             one["around"] = [
-                {"surface": number} | ({} if moved is None else {"place": _packed(moved, "<f4")})
-                for number, moved in surroundings.poses[k]
+                {"surface": pose.surface}
+                | ({} if pose.motion is None else {"place": _packed(pose.motion, "<f4")})
+                | ({} if pose.positions is None else {"positions": _packed(pose.positions, dtype)})
+                for pose in surroundings.poses[k]
             ]
         packed.append(one)
     return packed
@@ -253,6 +267,17 @@ def _surface(solid: Solid) -> dict[str, Any]:
         "opacity": solid.opacity,
         "smooth": solid.smooth,
     }
+
+
+def _history(
+    found: tuple[str, np.ndarray, dict[str, np.ndarray]] | None, chosen: list[int]
+) -> dict[str, Any] | None:
+    """Encode curves over all recorded states, and the numbers of those that the page shows."""
+    if found is None:
+        return None
+    name, along, columns = found
+    curves = [{"name": column, "values": _packed(values, "<f4")} for column, values in columns.items()]
+    return {"along": {"name": name, "values": _packed(along, "<f4")}, "columns": curves, "numbers": chosen}
 
 
 def _window(found: tuple[np.ndarray, np.ndarray, float] | None) -> dict[str, Any] | None:

@@ -26,7 +26,8 @@ class Screen:
     """An image of so many pixels (width, height) that panels are painted into."""
 
     def __init__(self, pixels: tuple[int, int], samples: int = SAMPLES):
-        self.pixels, self.samples = pixels, samples
+        self.pixels: tuple[int, int] = pixels
+        self.samples: int = samples
 
     def close(self) -> None:
         """Close nothing: it holds no window."""

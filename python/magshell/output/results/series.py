@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,8 @@ from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.shells.shell_stresses import ShellStresses
 from ...model.solids.solid_stresses import SolidStates
+from .probes import Probe
+from .series_probes import add_field_data, probe_columns
 from .state import State, states_of, with_times
 
 if TYPE_CHECKING:
@@ -110,6 +112,7 @@ def write_series(
     vertex_fields: dict[Any, Any] | None = None,
     face_fields: dict[Any, Any] | None = None,
     tetrahedron_fields: dict[Any, Any] | None = None,
+    probes: Probe | Sequence[Probe] = (),
     progress: bool = True,
 ) -> Path:
     """Write a series of states for ParaView: strip.pvd, and a folder strip/ with one VTU file per state (the extra `io`).
@@ -120,6 +123,8 @@ def write_series(
     remanent_magnetization, applied_flux_density, field: as in `plot`.
     vertex_fields, face_fields, tetrahedron_fields: name -> (n, n_v) or (n, n_v, k), (n, n_f) or (n, n_f, k), and (n, n_t)
         or (n, n_t, k), additional fields. Their rows are those of one body after another; faces include those of solids.
+    probes: of a result; the numbers of each ms.Probe are field data of the states' files, "tip.z [m]" and alike, which
+        ParaView plots over time.
     progress: show a progress bar once writing has taken two seconds.
 
     Fields on tetrahedra of a result are element means of `volume_ratio` (J), `von_mises_stress` and `cauchy_stress` [Pa] and
@@ -173,6 +178,7 @@ def write_series(
         more["vertex"]["velocity"] = quantity("velocities", "m/s", detached(velocities), (len(states), *row))
     in_field = any(state.flux_density is not None or state.has_sources for state in states)
     magnetized = any(state.is_magnetized for state in states)
+    probed = probe_columns(what, probes, positions)
     digits = len(str(len(states) - 1))
     names = [f"{path.stem}/{path.stem}_{k:0{digits}}.vtu" for k in range(len(states))]
     with _listed(path, names, states) as done, SolveBar("write_series", progress) as bar:
@@ -195,6 +201,10 @@ def write_series(
                 write_mesh(path.parent / names[k], flat, state.positions, on_vertices, on_faces)
             else:
                 write_solids(path.parent / names[k], state, on_vertices, on_faces, on_tetrahedra)
+            if probed:
+                add_field_data(
+                    path.parent / names[k], {name: float(values[k]) for name, values in probed.items()}
+                )
             done.append(k)
     return path
 

@@ -116,10 +116,10 @@ def _coil(a: np.ndarray, b: np.ndarray, radius: float, fine: bool) -> Surface:
     circle = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * np.cross(axis, side)
     wound = a + (_LEAD + (1.0 - 2.0 * _LEAD) * share)[:, None] * along + radius * circle
     line = np.concatenate([a[None], a[None] + _LEAD * along, wound, b[None] - _LEAD * along, b[None]])
-    return _tube(line, _WIRE * radius, sides)
+    return tube(line, _WIRE * radius, sides)
 
 
-def _tube(line: np.ndarray, radius: float, sides: int) -> Surface:
+def tube(line: np.ndarray, radius: float, sides: int) -> Surface:
     """Return a tube around a line (n, 3) m."""
     tangents = np.gradient(line, axis=0)
     tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-300)

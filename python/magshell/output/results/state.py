@@ -324,26 +324,27 @@ def _held_by(result) -> dict[str, Any]:
     held = {name: getattr(result, name, None) for name in ("positions", "remanent_magnetization", "field")}
     if isinstance(result, EquilibriumPath):
         flux_densities = result.applied_flux_densities
-        strengths = result._load_parameter("field_factor")[:, 0].tolist()
         titles = [f"parameter {parameter:.4g}" for parameter in result.parameters]
     elif isinstance(result, Trajectory):
         flux_densities = result.applied_flux_density
-        strengths = result._field_factors.tolist()
         titles = [""]
     else:
         flux_densities = getattr(result, "applied_flux_density", None)
-        strengths = [_field_factor(result)]
         titles = [""]
     if not result.scene.has_uniform_field:
         flux_densities = None
+    strengths = np.atleast_1d(field_factors(result)).tolist()
     return held | {"applied_flux_density": flux_densities, "strengths": strengths, "titles": titles}
 
 
-def _field_factor(result) -> float:
+def field_factors(result: Any) -> np.ndarray:
+    """Return the factor on the fields that vary in space in each state of a result, (n,), or () of a single state."""
+    if isinstance(result, Trajectory):
+        return result._field_factors
     load_parameters = getattr(result, "_load_parameters", None)
     if load_parameters is None:
-        return 1.0
-    return float(result.scene._load_parameter_layout.of(load_parameters, "scene", "field_factor")[0])
+        return np.ones(())
+    return result.scene._load_parameter_layout.of(load_parameters, "scene", "field_factor")[..., 0]
 
 
 def _states(

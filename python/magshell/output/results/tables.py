@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..._input.tensors import detached
+from ...model.fields.field import UniformField
 from ...solve.dynamics.trajectory import Trajectory
 from ...solve.statics.equilibria import EquilibriumSet
 from ...solve.statics.equilibrium import Equilibrium
 from ...solve.statics.path import EquilibriumPath
 from .probes import Probe, checked_probes
+from .state import field_factors
 
 if TYPE_CHECKING:
     import pandas
@@ -45,15 +47,14 @@ def to_xarray(
     (('time', 'vertex', 'axis'), 'm')
     """
     xarray = _imported("xarray")
-    coordinate, numbers = _states(result)
+    coordinate, numbers = coordinate_of(result)
     along = () if coordinate is None else (coordinate,)
     variables = {}
     for name, (unit, values) in _columns(result, checked_probes(probes)).items():
         variables[name] = (along, values, {"units": unit})
     for name, (unit, values) in _rows(result).items():
         variables[name] = ((*along, "vertex", "axis"), values, {"units": unit})
-    if (flux := getattr(result, "applied_flux_density", None)) is not None:
-        variables["applied_flux_density"] = ((*along, "axis"), np.asarray(detached(flux)), {"units": "T"})
+    variables["applied_flux_density"] = ((*along, "axis"), _flux_density(result), {"units": "T"})
     mesh = result.scene.mesh
     variables["rest_positions"] = (("vertex", "axis"), mesh.rest_positions, {"units": "m"})
     variables["faces"] = (("face", "corner"), mesh.faces)
@@ -70,7 +71,8 @@ def to_pandas(
 ) -> pandas.DataFrame:
     """Convert a result to a pandas.DataFrame (needs the package pandas), with units in the names of its columns.
 
-    per: "state" gives one row per state, with energies, strains and the uniform field. "vertex" gives one row per vertex and
+    per: "state" gives one row per state, with energies, strains the uniform field, and in fields
+        that vary in space the factor on them. "vertex" gives one row per vertex and
         state, with its position and, for a motion, its velocity. The index is `time [s]` of a Trajectory, `parameter` of an
         EquilibriumPath or `case` of an EquilibriumSet, and `vertex`.
     probes: each ms.Probe adds its columns to those of the states; a reaction or contact force on a path solves its points
@@ -92,7 +94,7 @@ def to_pandas(
     if chosen and per == "vertex":
         raise ValueError('probes are columns of states: they need per="state"')
     pandas = _imported("pandas")
-    coordinate, numbers = _states(result)
+    coordinate, numbers = coordinate_of(result)
     name = "time [s]" if coordinate == "time" else coordinate
     states = pandas.Index([0] if coordinate is None else numbers, name=name or "case")
     if per == "state":
@@ -100,9 +102,8 @@ def to_pandas(
             f"{what} [{unit}]": np.atleast_1d(values)
             for what, (unit, values) in _columns(result, chosen).items()
         }
-        if (flux := getattr(result, "applied_flux_density", None)) is not None:
-            for axis, values in zip("xyz", np.atleast_2d(np.asarray(detached(flux))).T, strict=True):
-                columns[f"applied_flux_density {axis} [T]"] = values
+        for axis, values in zip("xyz", np.atleast_2d(_flux_density(result)).T, strict=True):
+            columns[f"applied_flux_density {axis} [T]"] = values
         return pandas.DataFrame(columns, index=states)
     n_v = result.scene.mesh.n_vertices
     index = pandas.MultiIndex.from_product([states, range(n_v)], names=[states.name, "vertex"])
@@ -114,6 +115,11 @@ def to_pandas(
     return pandas.DataFrame(columns, index=index)
 
 
+def is_result(what: Any) -> bool:
+    """Return whether something is a result of a solve, which has a table."""
+    return isinstance(what, _RESULTS)
+
+
 def _imported(package: str):
     try:
         return importlib.import_module(package)
@@ -121,9 +127,9 @@ def _imported(package: str):
         raise ImportError(f'this needs {package}: pip install "magshell[tables]"') from error
 
 
-def _states(result) -> tuple[str | None, np.ndarray | None]:
+def coordinate_of(result: Any) -> tuple[str | None, np.ndarray | None]:
     """Return the name of the coordinate along which the states lie, and its values; None for a single state."""
-    if not isinstance(result, _RESULTS):
+    if not is_result(result):
         raise ValueError(
             f"result must be an Equilibrium, EquilibriumSet, an EquilibriumPath or a Trajectory, got {type(result).__name__}"
         )
@@ -164,9 +170,20 @@ def _own_columns(result) -> dict[str, tuple[str, np.ndarray]]:
         found["kinetic_energy"] = ("J", result.kinetic_energy)
     if isinstance(result, EquilibriumPath):
         found["n_negative_eigenvalues"] = ("1", result.n_negative_eigenvalues)
+    if any(not isinstance(each, UniformField) for each in result.scene.fields):
+        found["field_factor"] = ("1", field_factors(result))
     for name in ("largest_membrane_strain", "largest_bending_strain"):
         found[name] = ("1", np.asarray(getattr(result, name)))
     return found
+
+
+def _flux_density(result) -> np.ndarray:
+    """Return the uniform field in each state, (n, 3) T, or (3,) of a single state."""
+    if isinstance(result, EquilibriumSet):
+        return np.reshape([_flux_density(case) for case in result], (-1, 3))
+    if isinstance(result, EquilibriumPath):
+        return result.applied_flux_densities
+    return np.asarray(detached(result.applied_flux_density))
 
 
 def _rows(result) -> dict[str, tuple[str, np.ndarray]]:
