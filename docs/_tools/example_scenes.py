@@ -10,6 +10,7 @@ from front_page_scenes import ACCENT, SHEET, SOLID, Scene, between
 from painter import Body, Camera, Film, boundary
 
 import magshell as ms
+from magshell.output.results.spring_surfaces import tube
 
 _QUARTERS = ((1, 0), (0, 1), (-1, 0), (0, -1))  # cosines and sines of quarter turns
 FRAMES = 20  # of a motion
@@ -514,15 +515,7 @@ def _ball(center: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _wire(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the surface of a tube around a line of points (n, 3) m."""
-    import pyvista
-
-    tube = (
-        pyvista.lines_from_points(points)
-        .tube(radius=radius, n_sides=8)
-        .triangulate()
-        .clean()
-    )
-    return np.asarray(tube.points, dtype=float), tube.faces.reshape(-1, 4)[:, 1:]
+    return tube(points, radius, sides=8)
 
 
 _COMPUTED: dict[str, tuple[str, Callable[[], dict[str, Any]]]] = {

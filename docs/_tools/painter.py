@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista
+from matplotlib.colors import to_rgb
 from PIL import Image
 
+from magshell import _core
+
 WIDTH, HEIGHT = 320, 240  # pixels of a picture
-OVERSAMPLING = 3  # pictures are painted larger by this factor and reduced, which smooths their edges
+SAMPLES = 4  # along each side of a pixel, which smooths edges
 ANGLE = 18.0  # degrees, of the camera
 MARGIN = 1.16  # of the picture's width over that of what it shows
 SUN = np.array(
     [-0.25, -0.3, 1.0]
 )  # the direction of the light in the picture: right, towards the eye, up
+SUNLIGHT, HEADLIGHT = (
+    0.75,
+    0.25,
+)  # [-] brightness of the sun, and of a light beside the eye
+AMBIENT, DIFFUSE = (
+    0.42,
+    0.68,
+)  # [-] parts of a colour that are seen without light, and by how much the light adds
 SHADOW, LINE = "#dfe2e6", "#2b3138"
+LINE_WIDTH, LIFT = (
+    3.4e-3,
+    2e-3,
+)  # [-] of the width of the picture: lines, and by how much they are nearer to the eye
 FRAMES_PER_SECOND = 16
 BYTES = 50_000  # the largest size of a file
 QUALITIES = range(84, 20, -4)  # of WebP, tried in turn until the file is small enough
@@ -69,9 +84,7 @@ class Camera:
             points = np.concatenate(
                 [points, points - (points[:, 2:] - ground) * aimed.sun / aimed.sun[2]]
             )
-        around = np.radians(azimuth)
-        right = np.array([-np.sin(around), np.cos(around), 0.0])
-        axes = np.stack([right, np.cross(aimed.eye, right), aimed.eye])
+        axes = aimed.axes
         seen = points @ axes.T
         low, high = seen.min(axis=0), seen.max(axis=0)
         width = max(high[0] - low[0], (high[1] - low[1]) * WIDTH / HEIGHT)
@@ -86,6 +99,26 @@ class Camera:
         return np.array(
             [np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)]
         )
+
+    @property
+    def axes(self) -> np.ndarray:
+        """The unit vectors to the right, upwards and towards the eye, as the rows of a matrix (3, 3)."""
+        around = np.radians(self.azimuth)
+        right = np.array([-np.sin(around), np.cos(around), 0.0])
+        return np.stack([right, np.cross(self.eye, right), self.eye])
+
+    def on_screen(self, points: np.ndarray) -> np.ndarray:
+        """Return where points (n, 3) m are on the screen and in depth, (n, 3) m, in perspective.
+
+        Planes stay planes, so that a triangle hides another as it does in space. Raises ValueError if a point is behind the
+        eye.
+        """
+        distance = 0.5 * self.width / (np.tan(np.radians(0.5 * ANGLE)) * WIDTH / HEIGHT)
+        seen = (points - np.asarray(self.center, dtype=float)) @ self.axes.T
+        away = distance - seen[:, 2:]
+        if not away.min() > 0.0:
+            raise ValueError("a point is behind the eye: make the picture wider")
+        return seen * distance / away
 
     @property
     def sun(self) -> np.ndarray:
@@ -110,15 +143,7 @@ class Film:
 
     def paint(self) -> list[Image.Image]:
         """Return the images of all frames."""
-        plotter = pyvista.Plotter(
-            off_screen=True,
-            window_size=(OVERSAMPLING * WIDTH, OVERSAMPLING * HEIGHT),
-            lighting="none",
-        )
-        plotter.set_background("white")
-        images = [_painted(plotter, bodies, self.camera) for bodies in self.frames]
-        plotter.close()
-        return images
+        return [_painted(bodies, self.camera) for bodies in self.frames]
 
 
 def write(film: Film, path: Path) -> int:
@@ -128,20 +153,21 @@ def write(film: Film, path: Path) -> int:
     times[-1] *= film.held
     if film.back:
         images, times = images + images[-2:0:-1], times + times[-2:0:-1]
+    options: dict[str, Any] = {"method": 4, "minimize_size": True}
+    if len(images) > 1:
+        options |= {
+            "save_all": True,
+            "append_images": images[1:],
+            "duration": times,
+            "loop": 0,
+        }
     for quality in QUALITIES:
-        options = {"quality": quality, "method": 4, "minimize_size": True}
-        if len(images) > 1:
-            options |= {
-                "save_all": True,
-                "append_images": images[1:],
-                "duration": times,
-                "loop": 0,
-            }
-        images[0].save(path, format="WEBP", **options)
-        if path.stat().st_size <= BYTES:
-            return path.stat().st_size
+        content = io.BytesIO()
+        images[0].save(content, format="WEBP", quality=quality, **options)
+        if content.tell() <= BYTES:
+            return path.write_bytes(content.getvalue())
     raise RuntimeError(
-        f"{path.name} has {path.stat().st_size} bytes, and may have {BYTES}: show fewer frames"
+        f"{path.name} has {content.tell()} bytes, and may have {BYTES}: show fewer frames"
     )
 
 
@@ -154,82 +180,89 @@ def boundary(faces: np.ndarray) -> np.ndarray:
     return distinct[counts == 1]
 
 
-def _painted(
-    plotter: pyvista.Plotter, bodies: list[Body], camera: Camera
-) -> Image.Image:
-    plotter.clear_actors()
-    plotter.remove_all_lights()
-    plotter.add_light(
-        pyvista.Light(
-            position=tuple(camera.sun), light_type="scene light", intensity=0.75
-        )
-    )
-    plotter.add_light(
-        pyvista.Light(
-            position=tuple(camera.eye), light_type="scene light", intensity=0.25
-        )
-    )
+def _painted(bodies: list[Body], camera: Camera) -> Image.Image:
+    surfaces = []
     for body in bodies:
         if camera.ground is not None and body.shadow:
-            _add_shadow(plotter, body, camera)
-        _add(plotter, body, camera)
-    center = np.array(camera.center, dtype=float)
-    distance = 0.5 * camera.width / (np.tan(np.radians(0.5 * ANGLE)) * WIDTH / HEIGHT)
-    plotter.camera.position = tuple(center + distance * camera.eye)
-    plotter.camera.focal_point = tuple(center)
-    plotter.camera.up = (0.0, 0.0, 1.0)
-    plotter.camera.view_angle = ANGLE
-    plotter.camera.clipping_range = (0.1 * distance, 10 * distance)
-    plotter.render()
-    large = Image.fromarray(np.array(plotter.screenshot(return_img=True))[:, :, :3])
-    return large.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
+            surfaces.append(_shadow(body, camera))
+        surfaces.append(_skin(body, camera))
+        if body.lines is not None and len(body.lines):
+            surfaces.append(_lines(body, camera))
+    half_width, half_height = 0.5 * camera.width, 0.5 * camera.width * HEIGHT / WIDTH
+    light = SUNLIGHT * camera.axes @ (
+        camera.sun / np.linalg.norm(camera.sun)
+    ) + np.array([0.0, 0.0, HEADLIGHT])
+    image = _core.rasterized(
+        surfaces,
+        [-half_width, half_width, -half_height, half_height],
+        WIDTH,
+        HEIGHT,
+        samples=SAMPLES,
+        light=light.tolist(),
+        ambient=AMBIENT,
+        diffuse=DIFFUSE * float(np.linalg.norm(light)),
+    )
+    return Image.fromarray(image[:, :, :3])
 
 
-def _surface(points: np.ndarray, faces: np.ndarray) -> pyvista.PolyData:
-    return pyvista.PolyData(
-        np.asarray(points, dtype=float),
-        np.column_stack([np.full(len(faces), 3), faces]).ravel(),
+def _skin(body: Body, camera: Camera) -> dict[str, Any]:
+    colors = np.asarray(
+        to_rgb(body.color) if isinstance(body.color, str) else body.color, dtype=float
+    )
+    per_face = len(colors) == len(body.faces) and colors.ndim == 2
+    if colors.ndim == 1:
+        colors, per_face = np.tile(colors, (len(body.faces), 1)), True
+    return _surface(
+        camera.on_screen(body.points),
+        body.faces,
+        np.clip(colors, 0.0, 1.0),
+        per_face=per_face,
+        crease=body.crease if body.smooth else 0.0,
+        opacity=body.opacity,
     )
 
 
-def _add(plotter: pyvista.Plotter, body: Body, camera: Camera) -> None:
-    surface = _surface(body.points, body.faces)
-    look: dict[str, Any] = {
-        "ambient": 0.42,
-        "diffuse": 0.68,
-        "specular": 0.0,
-        "opacity": body.opacity,
-    }
-    if isinstance(body.color, str):
-        look["color"] = body.color
-    else:
-        data = (
-            surface.cell_data
-            if len(body.color) == len(body.faces)
-            else surface.point_data
-        )
-        data["colors"] = np.round(255 * np.clip(body.color, 0.0, 1.0)).astype(np.uint8)
-        look |= {"scalars": "colors", "rgb": True}
-    if body.smooth:
-        surface = surface.compute_normals(
-            cell_normals=False, split_vertices=True, feature_angle=body.crease
-        )
-    shading = {"smooth_shading": None if body.smooth else False}
-    plotter.add_mesh(
-        surface, interpolation="Phong" if body.smooth else "Flat", **shading, **look
-    )
-    if body.lines is not None and len(body.lines):
-        lift = 2e-3 * camera.width * camera.eye
-        lines = np.column_stack([np.full(len(body.lines), 2), body.lines]).ravel()
-        plotter.add_mesh(
-            pyvista.PolyData(body.points + lift, lines=lines),
-            color=LINE,
-            line_width=1.1 * OVERSAMPLING,
-        )
-
-
-def _add_shadow(plotter: pyvista.Plotter, body: Body, camera: Camera) -> None:
+def _shadow(body: Body, camera: Camera) -> dict[str, Any]:
     heights = body.points[:, 2:] - camera.ground
     flat = body.points - heights * camera.sun / camera.sun[2]
-    flat[:, 2] = camera.ground - 2e-3 * camera.width
-    plotter.add_mesh(_surface(flat, body.faces), color=SHADOW, lighting=False)
+    flat[:, 2] = camera.ground - LIFT * camera.width
+    return _surface(
+        camera.on_screen(flat),
+        body.faces,
+        np.tile(to_rgb(SHADOW), (len(body.faces), 1)),
+        lit=False,
+    )
+
+
+def _lines(body: Body, camera: Camera) -> dict[str, Any]:
+    """Return the lines of a body as bands of two triangles each, on the screen."""
+    ends = camera.on_screen(body.points)[body.lines] + np.array(
+        [0.0, 0.0, LIFT * camera.width]
+    )
+    along = (ends[:, 1] - ends[:, 0])[:, :2]
+    length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    across = np.zeros((len(ends), 1, 3))
+    across[:, 0, :2] = (
+        0.5 * LINE_WIDTH * camera.width * along[:, ::-1] * (-1.0, 1.0) / length
+    )
+    corners = np.concatenate([ends - across, ends[:, ::-1] + across], axis=1).reshape(
+        -1, 3
+    )
+    faces = (
+        4 * np.arange(len(ends))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
+    ).reshape(-1, 3)
+    return _surface(corners, faces, np.tile(to_rgb(LINE), (len(faces), 1)), lit=False)
+
+
+def _surface(
+    points: np.ndarray, faces: np.ndarray, colors: np.ndarray, **more: Any
+) -> dict[str, Any]:
+    usual = {"per_face": True, "lit": True, "crease": 0.0, "opacity": 1.0}
+    faces = np.ascontiguousarray(faces, dtype=np.int32)
+    return {
+        "positions": points,
+        "faces": faces,
+        "colors": np.ascontiguousarray(colors),
+        **usual,
+        **more,
+    }
