@@ -76,7 +76,7 @@ class Scene(PlotMixin):
     """A model: bodies, their supports, and the loads, actuators, fields and contacts that act on them.
 
     A scene can be solved many times. For that it stores the structure of its matrix and, up to 256 MB, the memory of its
-    last factorization. Kinds of objects that a scene does not have cost nothing.
+    last factorization. Features that a scene does not use cost nothing.
 
     bodies: a Shell or a Solid, or several of them, rigid bodies and Skeletons; bodies interact through ties and contacts
         only. Positions and faces of a result are those of one body after another, `result[body]` has those of one.
@@ -84,16 +84,16 @@ class Scene(PlotMixin):
     supports: Pin, Clamp and SymmetryPlane objects, and the ties EqualDisplacement and Periodic; with several bodies `body=`
         says which one a support holds.
     loads: PointLoad, EdgeLoad, AreaLoad, EdgeCouple, Pressure, SurfaceTension, CustomEnergy, Spring and ElasticFoundation
-        objects; with several bodies likewise.
+        objects; with several bodies `body=` says which one a load acts on.
     actuators: Muscle, Cavity, PneumaticCells and Tendon objects.
     field: None, an applied field, or several that superpose. A UniformField takes its value when the scene is solved.
-    own_field: an OwnField, with which magnetized shells attract and repel each other and themselves. None: bodies feel the
-        applied field only.
+    own_field: an OwnField, with which magnetized bodies act on each other and on themselves. None: only the applied field
+        acts on them.
     gravity: (3,), m/s2; needs the mass density of all bodies.
     contacts: Contact objects, each with its obstacles or its bodies, and SelfContact objects. Bodies pass through each
         other, and through themselves, where there is no contact.
-    water: the water that the sheet moves through, in ms.simulate only.
-    allow_rigid_motions: accept a scene that the supports do not hold entirely, because a field or gravity does.
+    water: a Water that acts on moving shells and solids, in ms.simulate only.
+    allow_rigid_motions: accept a scene whose supports leave rigid motions free, because a field or gravity determines them.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -116,7 +116,7 @@ class Scene(PlotMixin):
     _replaceable = ("gravity", "vertex_loads")
     _shares_directions = True  # whether edges with equal directions across them share one
     _numbered_like: Scene | None = None  # the scene whose numbering of elements and unknowns this one has
-    _stand_ins: dict[int, Any] = {}  # noqa: RUF012 - of a reshaped scene, its objects by the ids of those they stand for
+    _stand_ins: dict[int, Any] = {}  # noqa: RUF012 - in a reshaped scene: {id of an original object: the object in its place}
 
     @grouped()
     def __init__(
@@ -315,7 +315,7 @@ class Scene(PlotMixin):
 
     @property
     def _in_core(self) -> Values | None:
-        """The values that the core of this thread has at the moment."""
+        """The values that are set in the core of this thread."""
         return self._cores.current.values
 
     @property
@@ -323,12 +323,14 @@ class Scene(PlotMixin):
         return self._cores.current.solving
 
     def _own(self, item: Any) -> Any:
-        """Return the object of this scene that stands for one of the scene from which it was reshaped; others unchanged."""
+        """Return the object that takes the place of one of the scene from which this was reshaped; other objects
+        unchanged.
+        """
         return self._stand_ins.get(id(item), item)
 
     @cached_property
     def _family(self) -> object:
-        """The mark that this scene shares with those that differ from it in rest positions only."""
+        """An object that this scene shares with all scenes that differ from it in rest positions only."""
         return object()
 
     @cached_property
@@ -467,7 +469,7 @@ def _refuse_ties(scene: Scene) -> None:
 
 
 def _has_own_field(scene: Scene, body: Any) -> bool:
-    """Return whether the own field of a scene is about a body."""
+    """Return whether a body has a part in the own field of a scene."""
     given = scene.own_field
     return given is not None and (given.bodies is None or any(body is each for each in given.bodies))
 

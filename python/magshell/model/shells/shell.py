@@ -147,17 +147,17 @@ class Shell(Owner):
     magnetization_law: "stretches", the default, F M of the papers: the magnetization of a face stretches with it; or
         "rotates", R M of the polar decomposition F = R U: it turns with the face and keeps its magnitude, as experiments
         with sheets that are stretched show (docs/theory.md). Both are the same where a sheet bends without stretching.
-    susceptibility: chi of a film that an applied field magnetizes, M = chi H, above -1: as soft iron, or as an elastomer
-        filled with superparamagnetic grains, far from saturation. It is magnetized by chi B/mu0 along its plane and by
-        chi/(1 + chi) B/mu0 across it, as a thin plate is (docs/theory.md), in addition to its remanent_magnetization, which
-        need not be given then. For meshes of three-node faces. None: none, and no solve can change it.
-    growth: the factor by which lengths in the faces have grown, so that they are free of stress: a positive number, or a
-        symmetric tensor in world axes at rest, (3, 3) or one per face (n_f, 3, 3), of which the part in the face acts:
-        np.eye(3) + 0.1 np.outer(d, d) grows by a tenth along d. A sheet that is stretched by s before it is fixed to others
-        has growth 1/s. None: 1, and no solve can change it.
-    rest_curvature: 1/m, added to the curvature of the rest shape: a number (equal in all directions), or a symmetric
-        tensor as above, np.outer(d, d) / R bends along d; per grown length. Positive where normals lean together. None:
-        zero, and no solve can change it.
+    susceptibility: chi > -1 of a soft-magnetic film, M = chi H, such as soft iron, or an elastomer with superparamagnetic
+        grains, far from saturation. Like a thin plate it is magnetized by chi B/mu0 in its plane and by chi/(1 + chi) B/mu0
+        across it (docs/theory.md). This adds to remanent_magnetization, which may be left out. Only for meshes of three-node
+        faces. None: not susceptible, and no solve can change that.
+    growth: factor of the lengths in the faces in the stress-free state: a positive number, or a symmetric tensor in world
+        axes at rest, (3, 3) or one per face (n_f, 3, 3), whose in-plane part acts. np.eye(3) + 0.1 * np.outer(d, d)
+        lengthens by a tenth along d. A sheet that was stretched by s before it was fixed to others has growth 1/s. None:
+        1, and no solve can change it.
+    rest_curvature: 1/m of grown length, added to the curvature of the rest shape in the stress-free state: a number (equal
+        in all directions), or a symmetric tensor as for growth; np.outer(d, d) / R bends along d. Positive where
+        neighbouring normals lean towards each other. None: zero, and no solve can change it.
 
     A solve can replace all of these but the mesh, the bending and the law, and `rest_positions`, (n_v, 3) m, of the mesh
     (docs/how-to/rest-shape.md).
@@ -169,12 +169,13 @@ class Shell(Owner):
     growth and rest_curvature may change along ms.follow_path and in ms.simulate. With "hinge" both faces of an edge share
     one angle, their mean, and free edges have none.
 
-    Choice of the element: one of "midedge2" costs about eight times a face of "midedge", but far fewer are needed. For
+    Choice of the element: an element of "midedge2" costs about eight times as much as a face of "midedge", but far fewer are
+    needed. For
     deflections and loads to a percent or better, and for sheets that twist or are curved at rest, use "midedge2" with a
     QuadraticTriangleMesh; often the coarsest mesh that represents the shape is enough. If the mesh has to be fine anyway,
     for contacts, many small faces with their own magnetization, creases or folds, or if a few percent are enough, use
-    "midedge". The fourth order needs smooth solutions: at corners of clamps, point forces and jumps inside an element both
-    converge alike.
+    "midedge". The fourth order needs smooth solutions: at corners of clamps, at point forces and at jumps inside an
+    element both converge equally fast.
 
     >>> import magshell as ms
     >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)
@@ -284,7 +285,7 @@ class Shell(Owner):
             if name in values
         }
         kept = {"bending": self.bending, "magnetization_law": self.magnetization_law}
-        # Its curvature_scale is soft at the creases already, unless `values` hold another.
+        # The curvature_scale has the softness of the creases already, unless `values` replace it.
         return variant(Shell(mesh, **kept, **{**properties, **values, **grown}), creases=self.creases)
 
     @property
