@@ -90,8 +90,8 @@ class Muscle(Actuator):
     body: the Solid that they are in. With the deformation gradient F and the unit vector m along a fibre at rest, its
         stretch is l = |F m|; the tension is nominal, per rest area.
     fibres: ms.fibres_along(...), Fibres; or their direction at rest, (3,), one per tetrahedron, (n_t, 3), or a function of
-        positions (n_t, 3) m that returns these. The length of a direction has no effect, but must not be zero: the gradient
-        by directions is that of the normalized vector. elements: the tetrahedra that have fibres, by default all (with
+        positions (n_t, 3) m that returns these. Directions are normalized and must not be zero; gradients with respect to
+        them take this into account. elements: the tetrahedra that have fibres, by default all (with
         Fibres, theirs).
     activation: a, 1, the input of the muscle; in ms.simulate also over time, as (steps + 1, ...), (steps, ...) or a
         function. One number, or one per segment.
@@ -110,8 +110,8 @@ class Muscle(Actuator):
         to 1, with a row (0, 1). Tables are interpolated by twice differentiable curves; beyond a table its last value
         holds. The part that depends on the rate acts in ms.simulate only; it makes the matrix of a step unsymmetric.
 
-    Fibres that are crushed to l = 0 have no direction and no force; under compression, as with a negative activation, they
-    can buckle like rods.
+    Fibres that are compressed to l = 0 have no direction and no force. Under compression, as with a negative activation,
+    they can buckle like rods.
 
     A block with fibres along x, with half of its modulus as active stress, shortens:
 
@@ -212,7 +212,7 @@ class Muscle(Actuator):
             return np.array(given, dtype=np.int64), int(np.max(given)) + 1
         if self.coordinates is None:
             raise ValueError(
-                "segments can only be counted where fibres know their coordinates, as ms.fibres_along makes them"
+                "a number of segments needs fibres with coordinates, which ms.fibres_along makes"
             )
         start = min(float(self.coordinates.min()), 0.0) if self.length else 0.0
         fractions = (self.coordinates - start) / self.length
@@ -220,9 +220,11 @@ class Muscle(Actuator):
 
     @property
     def places(self) -> np.ndarray:  # plain-words: ok
-        """The coordinates of the segments' midpoints along the fibres, (segments,) m; of given segments, their means."""
+        """The coordinates of the segments along the fibres, (segments,) m: midpoints, or means for given segments."""
         if self.coordinates is None:
-            raise ValueError("fibres know no coordinates: ms.fibres_along makes some that do")
+            raise ValueError(
+                "these fibres have no coordinates: ms.fibres_along makes fibres with coordinates"
+            )
         if self.segments is None:
             return np.array([0.5 * self.length])
         counts = np.maximum(np.bincount(self.segments, minlength=self.n_segments), 1)

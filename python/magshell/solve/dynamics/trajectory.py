@@ -56,8 +56,8 @@ class MotionState:
     branch, one after another.
     Arrays that the motion did not need are empty: accelerations and strain rates are those of TRBDF2, Maxwell strains those
     of Maxwell branches. contact_acceleration: the share of contact and friction, which `acceleration` does not contain; only
-    with TRBDF2(implicit_contact=True). fine_faces: 1 for each magnetized face that samples the applied field finely, else 0;
-    where it is empty, the next motion decides anew.
+    with TRBDF2(implicit_contact=True). fine_faces: 1 for each magnetized face that evaluates the applied field at several
+    points, else 0; if it is empty, the next motion chooses these faces.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -131,21 +131,23 @@ class Trajectory(AnimateMixin, OfOneBody):
 
     Arrays have the rows of all bodies one after another; `trajectory[body]` has those of one body.
 
-    times: (n,) s, of the recorded states, the start among them. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
-    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C came meanwhile.
+    times: (n,) s, of the recorded states, including the start. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
+    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C interrupted their
+    computation.
     remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
-    largest_membrane_strain, largest_bending_strain: (n,), magnitudes, 1, of what `strains` has. Beyond 0.2 the sheet
-        leaves the model, of which ms.LargeStrainWarning warns.
-    steps: as given, the intervals of the time grid. steps_done: equal to `steps` unless the simulation stopped early.
-    time_steps: (m,) s, of the steps done: one for each interval, or more if ms.Adaptive or the caller divided them.
-        Passed as `time_step`, they repeat the motion.
-    step_errors: (m,) m, the estimated errors of the positions after each step, if it began without one: root mean squares
-        over vertices and points of rigid bodies, of an embedded formula of one order more. Beyond 1 % of the extent,
-        ms.StepErrorWarning warns.
-    substeps: {step: number of parts that it was taken in}.
-        fallback_steps: the steps of which implicit Euler took all or a part instead of the integrator, because a step in
-        contact would have gained energy without a source.
-    end: the last state, from which another simulation continues. bytes: stored for gradients.
+    largest_membrane_strain, largest_bending_strain: (n,), 1, the largest magnitudes of the strains that `strains` returns.
+        The model is for strains below 0.2; ms.LargeStrainWarning warns beyond.
+    steps: the number of intervals of the time grid, as given. steps_done: equal to `steps` unless the simulation stopped
+        early.
+    time_steps: (m,) s, the lengths of the steps done: one for each interval, or more where ms.Adaptive or the caller divided
+        an interval. Passed as `time_step`, they repeat the motion.
+    step_errors: (m,) m, the error of the positions that each step adds: the root mean square over vertices and points of
+        rigid bodies, estimated by an embedded formula of one order more. Beyond 1 % of the extent, ms.StepErrorWarning
+        warns.
+    substeps: {step: number of parts into which it was divided}.
+    fallback_steps: the steps that implicit Euler took, wholly or in part, because the integrator would have created
+        energy in contact.
+    end: the last state, from which another simulation continues. bytes: memory of the data stored for gradients.
     """
 
     scene: Scene
@@ -175,13 +177,12 @@ class Trajectory(AnimateMixin, OfOneBody):
     linear_time: float
     _field_factors: np.ndarray = field(repr=False)
     _load_factors: np.ndarray = field(repr=False)
-    _varied: dict[Any, Any] = field(
-        repr=False
-    )  # {(actuator, shell or field, name): (n, ...)}, of the recorded states
+    # {(actuator, shell or field, name): (n, ...)}, the values that vary in time, in the recorded states
+    _varied: dict[Any, Any] = field(repr=False)
     _step_factorizations: np.ndarray = field(repr=False)  # (m,), of each step
     _thickness: np.ndarray = field(repr=False)
     _values: Any = field(repr=False)
-    _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), of what clamps and symmetry planes hold
+    _directions: np.ndarray = field(repr=False)  # (n, 3 n_d), those that clamps and symmetry planes hold
     _held_forces: np.ndarray = field(repr=False)  # (n, m, 3) N, of the constraints' held nodes
     _own_points: Any = field(repr=False, default=None)  # (n, 10 a rigid part, 3)
     _own_velocities: Any = field(repr=False, default=None)
@@ -239,11 +240,11 @@ class Trajectory(AnimateMixin, OfOneBody):
     def nonsmooth_vertices(self) -> dict[int, np.ndarray]:
         """The vertices in contact where the motion is not differentiable, {recorded state: vertices}.
 
-        They touch an obstacle at a sharp edge of a box or a mesh or in the middle of a body, within the smoothing; or, of
-        bodies in contact, their closest point passes an edge of the other surface that is bent by more than 0.3 rad, or its
-        border. A small change may bring such a vertex to another side; gradients are those of the side on which it is.
+        They touch an obstacle, within the smoothing, at a sharp edge of a box or a mesh or on its medial surface. Or, for
+        bodies in contact, their closest point passes an edge of the other surface that is bent by more than 0.3 rad, or
+        its border. A small change may bring such a vertex to another side; gradients are those of the side on which it is.
 
-        Computed when asked for, in the recorded states only. Opening, closing, sticking and sliding contacts do not count:
+        Computed on access, in the recorded states only. Opening, closing, sticking and sliding contacts do not count:
         the laws of contact and friction are smooth there, and `contact_state` has them.
 
         >>> import magshell as ms
@@ -299,7 +300,7 @@ class Trajectory(AnimateMixin, OfOneBody):
                 np.asarray(positions, dtype=np.float64), np.asarray(rotations, dtype=np.float64)
             )
         before = 3 * self.scene._bodies.n_points
-        if self._own_points is not None:  # vertices do not determine where free rigid bodies are
+        if self._own_points is not None:  # vertices do not determine the positions of free rigid bodies
             own = np.asarray(detached(self._own_points)[index], dtype=np.float64)
             state[:before] = model.full_vector(np.concatenate([positions, own]))[:before]
         state[before : before + self._directions.shape[1]] = self._directions[index]
