@@ -212,7 +212,8 @@ def _moving_strip(
 ) -> Environment:
     """Make the environment of a strip along x that a field in the plane of x and z moves.
 
-    strongest: T, of each component of the field. distance: function of a snapshot, that which the reward counts, m.
+    strongest: T, of each component of the field. distance: function of a snapshot: the distance travelled that the reward
+        counts, m.
     """
     x = scene.mesh.rest_positions[:, 0]
     ends = [np.flatnonzero(x < 1e-3 * length), np.flatnonzero(x > 0.999 * length)]

@@ -128,7 +128,7 @@ BAD = {
         r"length_unit must be one of m, cm, mm, um, got 'inch'",
     ),
     "unknown column unit": ([NAMED.replace("mT", "Wb")], {}, r"a column in 'Wb', which is none of T, mT"),
-    "names": ([NAMED.replace("Bx", "Hx")], {}, r"of which not just one is Bx: say by columns"),
+    "names": ([NAMED.replace("Bx", "Hx")], {}, r"but not exactly one is Bx: say by columns"),
     "columns": ([NAMED], {"columns": ("x",)}, r"columns must name six columns"),
     "column": ([NAMED], {"columns": ("x", "y", "z", "Bx", "By", "B")}, r"has no column 'B', only x, y, z"),
     "counts": ([NAMED], {"counts": (2, 2)}, r"counts must be three integers"),

@@ -127,7 +127,7 @@ def test_a_ball_in_front_of_another_has_its_outline_and_one_behind_has_none() ->
 
 
 def test_edges_in_front_of_a_near_surface_are_no_silhouettes() -> None:
-    """Sink a ball into another up to a shallow cap, whose outline would only be a fold."""
+    """Move a ball into another up to a shallow cap, whose outline would only be a fold."""
     eye = np.array([0.0, -1.0, 0.0])
     [state] = states_of(two_balls(0.1 - 0.004))
     assert lengths(silhouettes(state, eye)) == pytest.approx(2 * np.pi * 0.1, rel=0.05)

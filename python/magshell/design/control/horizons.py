@@ -79,13 +79,13 @@ def receding_horizon(
     until: Callable[..., Any] | None = None,
     progress: bool = True,
 ) -> RecedingHorizonResult:
-    """Minimize over a control in time, `prediction_horizon` rows at once, of which the first `control_horizon` are
-    then applied.
+    """Minimize over a control in time by receding horizons: optimize `prediction_horizon` rows, then apply the first
+    `control_horizon` of them.
 
     This is for unstable motions: a small perturbation of the start grows with time, until gradients of the whole motion
     are useless for a search, and the motion found depends on rounding. Over a horizon in which perturbations grow little,
-    gradients are good. Each search begins at the state that the motion has really reached, and so corrects deviations up
-    to there: this is feedback, computed beforehand. Stable motions are better optimized at once, to their end. Applied
+    gradients are useful. Each search begins at the state that the motion has reached, and so corrects earlier deviations
+    (feedback). Stable motions are better optimized as a whole. Applied
     again from the same start, the control found gives the same motion to the bit, if `advance` does (ms.simulate, from a
     MotionState, does).
 
@@ -93,7 +93,7 @@ def receding_horizon(
         `first` begins. It returns what an objective of ms.minimize does.
     advance: function of the rows (settled - first, ...), a tensor; of the Horizon; and of that state. It returns the state
         in which row `settled` begins, such as Trajectory.end.
-    controls: (steps, ...), where every row starts until it is planned.
+    controls: (steps, ...), the values of rows that have not been optimized yet.
     prediction_horizon, control_horizon: rows. The last horizons end with the control, and are shorter.
     start: the state in which row 0 begins, passed to the first calls as it is.
     lower, upper: bounds, numbers or of the shape of a row.
@@ -111,8 +111,8 @@ def receding_horizon(
     until: function of the state; ends where it returns True.
     progress: show a bar of the rows settled.
 
-    A search that meets a control that cannot be evaluated, and cannot go around it, ends with the best control so far,
-    which is then applied, and `failures` says so. Once the first rows are settled, Ctrl-C raises Interrupted and any other
+    A search that cannot avoid controls that cannot be evaluated ends with the best control so far. It is applied, and
+    `failures` records this. Once the first rows are settled, Ctrl-C raises Interrupted and any other
     error ObjectiveFailed, with the RecedingHorizonResult so far as `last_good`; before, the error itself is raised.
 
     >>> import torch, magshell as ms

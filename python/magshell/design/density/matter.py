@@ -191,8 +191,8 @@ class Matter(Frozen):
 def _part_of_mesh(mesh: TriangleMesh, faces: np.ndarray) -> tuple[TriangleMesh, np.ndarray]:
     """Return the mesh of the chosen faces, in ascending order, and the number in `mesh` of each of its vertices.
 
-    Faces that touch at a vertex, and not along an edge, get separate vertices there. Groups are kept as far as their
-    members are.
+    Faces that touch at a vertex, and not along an edge, get separate vertices there. Groups keep those of their members
+    that remain.
 
     faces: indices, ascending, at least one.
     """

@@ -85,7 +85,7 @@ class Approximation:
 
 @dataclass(frozen=True)
 class ApproximationData:
-    """The data of which approximations around a design are made; slopes, distances and steps t in units of scale.
+    """The data from which approximations around a design are made. Slopes, distances and steps t are in units of scale.
 
     values: (1 + m,). slopes g: (1 + m, n), over the free entries. sizes: (1 + m,), the largest slope of each
     function. distance s, scale: (n,). lower, upper: (n,), the interval of t.

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def bisected_edges(mesh: TriangleMesh, marked: np.ndarray) -> np.ndarray:
     """Return the edges to be divided so that the marked faces, (k,), are divided and the mesh stays conforming, ascending.
 
-    They are all edges of marked faces, and the longest edge of every face of which another edge is divided.
+    They are all edges of marked faces, and the longest edge of every face that has another divided edge.
     """
     face_edges = mesh.face_edges
     longest = face_edges[np.arange(mesh.n_faces), longest_sides(mesh)]

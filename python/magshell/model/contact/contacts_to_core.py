@@ -42,7 +42,7 @@ def split_contacts(contacts: Sequence[Contact | BodyContact]) -> tuple[tuple[Any
 def body_contact_inputs(
     contacts: Sequence[Contact | BodyContact], bodies: Bodies
 ) -> tuple[list[dict[Any, Any]], list[dict[Any, Any]]]:
-    """Return the input of contacts between bodies, as far as no solve can change it: the surfaces and the contacts."""
+    """Return the constant part of the input of contacts between bodies, which no solve can change: surfaces and contacts."""
     _check_each_pair_once(contacts)
     sides = list({id(side): side for contact in contacts for side in contact._sides}.values())
     numbers = {id(side): k for k, side in enumerate(sides)}
@@ -182,7 +182,7 @@ def check_shapes(
 
 
 def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) -> list[dict[Any, Any]]:
-    """Return the input of contacts with obstacles, as far as no solve can change it."""
+    """Return the constant part of the input of contacts with obstacles, which no solve can change."""
     numbers = {id(each): k for k, each in enumerate(obstacles_of(contacts))}
     inputs = []
     for contact in contacts:

@@ -118,7 +118,7 @@ def _chosen(path: Path, names: list[str], width: int, columns) -> list[int]:
         missing = [name for name in _NAMES if plain.count(name.lower()) != 1]
         if missing:
             raise ValueError(
-                f"{path.name!r} has the columns {', '.join(names)}, of which not just one is {missing[0]}: say by "
+                f"{path.name!r} has the columns {', '.join(names)}, but not exactly one is {missing[0]}: say by "
                 f"columns=(...) which are {', '.join(_NAMES)}"
             )
         return [plain.index(name.lower()) for name in _NAMES]

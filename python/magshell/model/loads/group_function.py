@@ -146,7 +146,7 @@ class GroupFunction:
     def _check_slope(
         self, at: Callable[[float], tuple[np.ndarray, np.ndarray]], slope: float, by: str
     ) -> None:
-        """Compare a derivative with differences where these say what it is."""
+        """Compare a derivative with differences, where these are accurate."""
 
         def energies(t: float) -> np.ndarray:
             return self.sample(*at(t), 0)[0]

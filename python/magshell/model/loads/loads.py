@@ -152,7 +152,7 @@ class EdgeCouple(Owner):  # plain-words: ok
     """A moment per rest length [N] that turns the director of free boundary edges about the edge itself.
 
     couple_per_length: a number, about the edge's direction with the sheet on its left (seen from the side to which its
-        normals point), positive by the right-hand rule; or a vector (3,), of which the component along each rest edge
+        normals point), positive by the right-hand rule; or a vector (3,), whose component along each rest edge
         acts. There is no force, and the axis follows the edge.
     body: the Shell whose edges they are, in a scene of several.
 

@@ -80,7 +80,7 @@ class RigidBody(Owner):
         motion that starts at rest positions. Vertices take theirs from the `velocities` of ms.simulate.
     body: the Shell or Solid whose vertices they are, in a scene of several.
     shape: the surface for an ms.Contact with other bodies and for pictures: a TriangleMesh in its rest pose, or one of
-        ms.shapes, of which the surface of about 2000 tetrahedra is used. `RigidBody.of` computes mass, inertia and center
+        ms.shapes, which is meshed with about 2000 tetrahedra. `RigidBody.of` computes mass, inertia and center
         from a shape.
 
     Supports cannot hold its vertices. `result[body]` has its center, rotation and velocities. ms.simulate integrates it

@@ -121,7 +121,7 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
 
 
 def _all_magnetized(scene: Scene) -> list[Shell | Solid | RigidBody]:
-    """Return the bodies of a scene that have a magnetization or a moment, of which OwnField() is about."""
+    """Return the bodies of a scene that have a magnetization or a moment: those that OwnField() includes."""
     bodies = [
         body
         for body in scene.bodies

@@ -66,7 +66,9 @@ def warn_of_units(scene: Scene, values: Values) -> None:
 
 def _warn_of_composites(scene: Scene, values: Values, magnetization: float) -> None:
     """Warn of values that no magnetized soft body has, and of gravity in mm/s2. magnetization: A/m, the largest entry."""
-    moduli = [np.max(held) for body in values.deformable if (held := _held(body, "young_modulus")) is not None]
+    moduli = [
+        np.max(held) for body in values.deformable if (held := _held(body, "young_modulus")) is not None
+    ]
     if max(moduli, default=0.0) >= SOFT_MODULUS:
         if 0.0 < magnetization < LEAST_MAGNETIZATION:
             text = f"remanent_magnetization [A/m] has entries up to {magnetization:g}, and composites at least 1000"

@@ -171,7 +171,7 @@ def _with_rest(
 
 
 def _about(item: Any, now: dict[int, Any]) -> Any:
-    """Return an object of the scene that names the bodies of `now`, by their ids, in place of those they stand for."""
+    """Return an object of the scene in which the bodies with the ids in `now` are replaced by its values."""
 
     def named(value: Any) -> Any:
         if id(value) in now:

@@ -73,7 +73,7 @@ class SolidMaterial(Frozen):
 
     @property
     def _moduli(self) -> tuple[str, ...]:
-        """The names of the constants in Pa, to all of which together its energy is proportional."""
+        """The names of the constants in Pa. The energy is proportional to a common factor of all of them."""
         return tuple(name for name in self.names if self._ranges[name][0] == "Pa")
 
     def replaced(self, **values: Any) -> SolidMaterial:

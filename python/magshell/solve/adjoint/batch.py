@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 class Member(NamedTuple):
     """The solution of one member: its result, the arrays of it, and its gradients.
 
-    leaves: the tensors by which the adjoint computes gradients. tensors: those that stand for the values of the batch that
-    gradients are computed for; the leaves are they themselves, or were computed from them.
+    leaves: the tensors with respect to which the adjoint computes gradients. tensors: the member's tensors in place of the
+    batched values that need a gradient; the leaves are these tensors, or were computed from them.
     """
 
     result: Any

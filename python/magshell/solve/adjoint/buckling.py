@@ -22,11 +22,12 @@ if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Leaf
     from ...model.scene.values import Gradient
 
-BEFORE, AFTER = 0, 1  # the load parameters c and c1, of which a leaf may be
+BEFORE, AFTER = 0, 1  # which load parameters a leaf belongs to: c or c1
 
 
 class BucklingAdjoint(EigenvalueAdjoint):
-    """The gradients of buckling factors by the inputs of the state whose stiffness K is, and by further load parameters.
+    """The gradients of buckling factors with respect to the inputs of the state with stiffness K, and to further load
+    parameters.
 
     residual: there. after: c1. response: u of all unknowns. vectors: (size, m), modes v of all unknowns. complete: as in
         EigenvalueAdjoint. leaves: each with BEFORE or AFTER. at_rest: the state does not depend on the inputs.

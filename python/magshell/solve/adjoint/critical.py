@@ -37,9 +37,9 @@ _ACROSS = 1e-6
 
 
 class CriticalAdjoint:
-    """The gradients of the parameter and of the positions of a critical point by the inputs of its path.
+    """The gradients of the parameter and of the positions of a critical point with respect to the inputs of its path.
 
-    of_start: leaves of the equilibrium at which the path starts, of which its first load parameters are.
+    of_start: leaves of the equilibrium at which the path starts, on which its first load parameters depend.
     refusal: why there is no gradient, or "".
     """
 
