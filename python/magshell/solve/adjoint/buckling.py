@@ -61,21 +61,23 @@ class BucklingAdjoint(EigenvalueAdjoint):
     def _gradient(self, k: int) -> tuple[Gradient, ...]:
         here, factor, response = self._residual, self._eigenvalues[k], self._response
         vector = self._vectors[:, k]
-        vector = vector * np.sqrt(factor / (vector @ here.slopes(vector).by_state))
-        bent = here.bent(vector, vector)
-        rates = here.bent_rates(vector, response, self._after - here.load_parameters)
+        vector = vector * np.sqrt(factor / (vector @ here.derivatives(vector).by_state))
+        by_stiffness = here.hessian_derivatives(vector, vector)
+        rates = here.hessian_derivative_rates(vector, response, self._after - here.load_parameters)
         # d/dt [(1 - t) K_c] for the load parameters before, d/dt [t K_c] for those after.
-        by_after = factor * bent.by_load_parameters
-        total = bent.plus(factor, rates)
+        by_after = factor * by_stiffness.by_load_parameters
+        total = by_stiffness.plus(factor, rates)
         total = total._replace(by_load_parameters=total.by_load_parameters - by_after)
-        multiplier = multiplier_of(here, factor * bent.by_state)
-        there = here.at(here.state, self._after).slopes(multiplier)
-        total = total.plus(1.0, here.bent(multiplier, response)).plus(-1.0, here.slopes(multiplier))
+        multiplier = multiplier_of(here, factor * by_stiffness.by_state)
+        there = here.at(here.state, self._after).derivatives(multiplier)
+        total = total.plus(1.0, here.hessian_derivatives(multiplier, response)).plus(
+            -1.0, here.derivatives(multiplier)
+        )
         total = total.plus(1.0, there._replace(by_load_parameters=np.zeros_like(there.by_load_parameters)))
         by_after = by_after + there.by_load_parameters
         if self._at_rest:
             total = total.at_fixed_state()
         else:
-            total = total.plus(1.0, here.slopes(multiplier_of(here, total.by_state)))
+            total = total.plus(1.0, here.derivatives(multiplier_of(here, total.by_state)))
         after = total.at_fixed_state()._replace(by_load_parameters=by_after)
         return here.by_inputs(total), here.by_inputs(after)

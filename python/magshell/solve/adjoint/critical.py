@@ -25,7 +25,7 @@ from .critical_system import CriticalSystem, Located, forces_and_prescribed
 from .differences import directional_derivative
 from .energy import Unknowns
 from .leaf_gradient import by_leaf
-from .residual import Slopes
+from .residual import Derivatives
 from .tangent import changed, steps_along
 
 if TYPE_CHECKING:
@@ -69,12 +69,12 @@ class CriticalAdjoint:
             system = self._system
             by_state = self._by_state(by_positions)
             if self._point.kind == "limit":
-                slopes = _of_limit(system, float(by_parameter), by_state)
+                derivatives = _of_limit(system, float(by_parameter), by_state)
             else:
                 self._refuse_asymmetric(system)
                 self._refuse_what_dissolves(system, wanted)
-                slopes = _of_bifurcation(system, float(by_parameter), by_state)
-            total = system.residual.by_inputs(slopes)
+                derivatives = _of_bifurcation(system, float(by_parameter), by_state)
+            total = system.residual.by_inputs(derivatives)
         return [
             by_leaf(inputs, leaf, _scaled(inputs, total, fraction)) if asked else None
             for (leaf, fraction), asked in zip(self._leaves, wanted, strict=True)
@@ -92,24 +92,26 @@ class CriticalAdjoint:
             raise NoGradient(self._refusal)
         with self._inputs.in_core():
             system = self._system
-            forces, held, bent = np.zeros(model.free_size), np.zeros(model.size), 0.0
+            forces, held, eigenvalue_change = np.zeros(model.free_size), np.zeros(model.size), 0.0
             for (leaf, fraction), change in zip(self._leaves, along, strict=True):
                 if not np.any(change):
                     continue
                 rates = self._rates(system, leaf, fraction, change)
                 forces, held = forces + rates[0], held + rates[1]
                 by_values = Gradient(
-                    self._inputs.scene, system.bent.by_values, fraction * system.bent.by_load_parameters
+                    self._inputs.scene,
+                    system.eigenvalue_derivatives.by_values,
+                    fraction * system.eigenvalue_derivatives.by_load_parameters,
                 )
-                bent += float(np.sum(by_leaf(self._inputs, leaf, by_values) * change))
-            bent += float(system.bent.by_state @ held)
+                eigenvalue_change += float(np.sum(by_leaf(self._inputs, leaf, by_values) * change))
+            eigenvalue_change += float(system.eigenvalue_derivatives.by_state @ held)
             if self._point.kind == "limit":
-                rate, motion = _motion_of_limit(system, forces, bent)
+                rate, motion = _motion_of_limit(system, forces, eigenvalue_change)
             else:
                 self._refuse_asymmetric(system)
                 if system.alignment(forces) > _ACROSS:
                     raise NoGradient(_DISSOLVES.format("along this change"))
-                rate, motion = _motion_of_bifurcation(system, forces, bent)
+                rate, motion = _motion_of_bifurcation(system, forces, eigenvalue_change)
             change = model.expand(motion) + held + rate * system.rates[1]
         return [np.array(rate), np.ascontiguousarray(model.positions(change))]
 
@@ -136,8 +138,8 @@ class CriticalAdjoint:
         ]
 
     def _refuse_asymmetric(self, system: CriticalSystem) -> None:
-        bent = self._inputs.scene._model.reduce(system.bent.by_state)
-        if system.alignment(system.rates[0]) > _ACROSS or system.alignment(bent) > _ACROSS:
+        by_state = self._inputs.scene._model.reduce(system.eigenvalue_derivatives.by_state)
+        if system.alignment(system.rates[0]) > _ACROSS or system.alignment(by_state) > _ACROSS:
             raise NoGradient(
                 "no gradient here: the bifurcation is not symmetric (its two sides differ, or loads push along its mode), "
                 "and may dissolve under the smallest change. Use a mesh with the symmetry of the scene, or give the scene "
@@ -146,7 +148,7 @@ class CriticalAdjoint:
 
     def _refuse_what_dissolves(self, system: CriticalSystem, wanted: Sequence[bool]) -> None:
         """Raise NoGradient if a change of a wanted leaf pushes along the mode of a bifurcation, in its steepest way."""
-        total = system.residual.by_inputs(system.residual.slopes(system.vector))
+        total = system.residual.by_inputs(system.residual.derivatives(system.vector))
         for (leaf, fraction), asked in zip(self._leaves, wanted, strict=True):
             if not asked:
                 continue
@@ -195,60 +197,68 @@ def _scaled(inputs: Inputs, gradient: Gradient, fraction: float) -> Gradient:
     return Gradient(inputs.scene, gradient.of_values, by_load_parameters, rest=gradient.rest)
 
 
-def _of_limit(system: CriticalSystem, by_parameter: float, by_state: np.ndarray) -> Slopes:
+def _of_limit(system: CriticalSystem, by_parameter: float, by_state: np.ndarray) -> Derivatives:
     """Return the derivatives of a function of the parameter and the state of a limit point, with these derivatives."""
     model = system.residual.inputs.scene._model
     rate, held = system.rates
     push = float(system.null @ rate)
     total = by_parameter + float(by_state @ held)
     if not by_state.any():
-        return system.residual.slopes(system.vector * (-total / push))
-    turn = float(system.bent.by_state @ system.vector)
-    bend = -float(by_state @ system.vector) / turn
-    by_state = by_state + bend * system.bent.by_state
+        return system.residual.derivatives(system.vector * (-total / push))
+    turn = float(system.eigenvalue_derivatives.by_state @ system.vector)
+    eta = -float(by_state @ system.vector) / turn
+    by_state = by_state + eta * system.eigenvalue_derivatives.by_state
     particular = system.solve(-model.reduce(by_state))
-    total = total + float(particular @ rate) + bend * system.bent_by_parameter
+    total = total + float(particular @ rate) + eta * system.eigenvalue_rate
     multiplier = model.expand(particular - (total / push) * system.null)
-    return _with_state(system, by_state, multiplier, bend)
+    return _with_state(system, by_state, multiplier, eta)
 
 
-def _motion_of_limit(system: CriticalSystem, forces: np.ndarray, bent: float) -> tuple[float, np.ndarray]:
+def _motion_of_limit(
+    system: CriticalSystem, forces: np.ndarray, eigenvalue_change: float
+) -> tuple[float, np.ndarray]:
     """Return the derivatives of the parameter and of the free unknowns where dg and d(v . K v) are these."""
     rate = -float(system.null @ forces) / float(system.null @ system.rates[0])
     motion = system.solve(-(forces + rate * system.rates[0]))
-    by_state = system.residual.inputs.scene._model.reduce(system.bent.by_state)
-    left = bent + float(by_state @ motion) + rate * system.bent_by_parameter
+    by_state = system.residual.inputs.scene._model.reduce(system.eigenvalue_derivatives.by_state)
+    left = eigenvalue_change + float(by_state @ motion) + rate * system.eigenvalue_rate
     return rate, motion - system.null * left / float(by_state @ system.null)
 
 
-def _of_bifurcation(system: CriticalSystem, by_parameter: float, by_state: np.ndarray) -> Slopes:
+def _of_bifurcation(system: CriticalSystem, by_parameter: float, by_state: np.ndarray) -> Derivatives:
     """Return the derivatives of a function of the parameter and the state of a symmetric bifurcation."""
     model = system.residual.inputs.scene._model
     rate, held = system.rates
     by_state = by_state - system.vector * (by_state @ system.vector) / (system.null @ system.null)
     along = system.solve(-rate)
     total = by_parameter + float(by_state @ held) + float(model.reduce(by_state) @ along)
-    bend = -total / float(model.reduce(system.bent.by_state) @ along + system.bent_by_parameter)
-    by_state = by_state + bend * system.bent.by_state
-    return _with_state(system, by_state, model.expand(system.solve(-model.reduce(by_state))), bend)
+    eta = -total / float(
+        model.reduce(system.eigenvalue_derivatives.by_state) @ along + system.eigenvalue_rate
+    )
+    by_state = by_state + eta * system.eigenvalue_derivatives.by_state
+    return _with_state(system, by_state, model.expand(system.solve(-model.reduce(by_state))), eta)
 
 
 def _motion_of_bifurcation(
-    system: CriticalSystem, forces: np.ndarray, bent: float
+    system: CriticalSystem, forces: np.ndarray, eigenvalue_change: float
 ) -> tuple[float, np.ndarray]:
     """Return the derivatives of the parameter and of the free unknowns where dg and d(v . K v) are these."""
     motion, along = system.solve(-forces), system.solve(-system.rates[0])
-    by_state = system.residual.inputs.scene._model.reduce(system.bent.by_state)
-    rate = -(bent + float(by_state @ motion)) / (float(by_state @ along) + system.bent_by_parameter)
+    by_state = system.residual.inputs.scene._model.reduce(system.eigenvalue_derivatives.by_state)
+    rate = -(eigenvalue_change + float(by_state @ motion)) / (
+        float(by_state @ along) + system.eigenvalue_rate
+    )
     motion = motion + rate * along
     return rate, motion - system.null * (system.null @ motion) / (system.null @ system.null)
 
 
-def _with_state(system: CriticalSystem, by_state: np.ndarray, multiplier: np.ndarray, bend: float) -> Slopes:
-    """Return the derivatives of multiplier . g + bend v . K v, and those by the state that were given in addition."""
-    found = system.residual.slopes(multiplier)
-    return Slopes(
+def _with_state(
+    system: CriticalSystem, by_state: np.ndarray, multiplier: np.ndarray, eta: float
+) -> Derivatives:
+    """Return the derivatives of multiplier . g + eta v . K v, and those by the state that were given in addition."""
+    found = system.residual.derivatives(multiplier)
+    return Derivatives(
         found.by_state + by_state,
-        found.by_values + bend * system.bent.by_values,
-        found.by_load_parameters + bend * system.bent.by_load_parameters,
+        found.by_values + eta * system.eigenvalue_derivatives.by_values,
+        found.by_load_parameters + eta * system.eigenvalue_derivatives.by_load_parameters,
     )

@@ -17,7 +17,7 @@ from ... import _core
 from ...errors import NoGradient
 from .differences import directional_derivative
 from .factorized import Factorized
-from .residual import Residual, Slopes
+from .residual import Derivatives, Residual
 
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Inputs
@@ -88,19 +88,22 @@ class CriticalSystem:
             raise NoGradient("no gradient here: the forces are not smooth at the critical point")
         forces, held = rates
         if held.any():
-            forces = forces + self.residual.slopes(held).by_state
+            forces = forces + self.residual.derivatives(held).by_state
         return self._model.reduce(forces), held
 
     @cached_property
-    def bent(self) -> Slopes:
+    def eigenvalue_derivatives(self) -> Derivatives:
         """The derivatives of v . K v at a fixed v."""
-        return self.residual.bent(self.vector, self.vector)
+        return self.residual.hessian_derivatives(self.vector, self.vector)
 
     @property
-    def bent_by_parameter(self) -> float:
+    def eigenvalue_rate(self) -> float:
         """The derivative of v . K v by the path parameter, at fixed free unknowns."""
         rate = self.line.after - self.line.before
-        return float(self.bent.by_load_parameters @ rate + self.bent.by_state @ self.rates[1])
+        return float(
+            self.eigenvalue_derivatives.by_load_parameters @ rate
+            + self.eigenvalue_derivatives.by_state @ self.rates[1]
+        )
 
     def alignment(self, forces: np.ndarray) -> float:
         """Return the cosine between the mode and forces, 0 if these vanish."""
@@ -174,19 +177,19 @@ class Located:
         rate, held = system.rates
         back = system.solve(-model.reduce(system.residual.gradient()))
         along = system.solve(-rate)
-        by_state = model.reduce(system.bent.by_state)
+        by_state = model.reduce(system.eigenvalue_derivatives.by_state)
         if self.kind == "limit":
             k, slid = system.pinned, system.excess * system.response
             matrix = np.array(
                 [
                     [-slid[k], along[k]],
-                    [by_state @ (system.null - slid), by_state @ along + system.bent_by_parameter],
+                    [by_state @ (system.null - slid), by_state @ along + system.eigenvalue_rate],
                 ]
             )
             share, change = np.linalg.solve(matrix, [-back[k], -system.excess - by_state @ back])
             motion = share * (system.null - slid) + back + change * along
         else:
-            change = -(system.excess + by_state @ back) / (by_state @ along + system.bent_by_parameter)
+            change = -(system.excess + by_state @ back) / (by_state @ along + system.eigenvalue_rate)
             motion = back + change * along
         return float(change), model.expand(motion) + change * held
 

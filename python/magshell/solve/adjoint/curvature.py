@@ -67,10 +67,12 @@ def curvature(
         there = moved_inputs(inputs, [step * each for each in along])
         with there.in_core():
             residual = Residual(there, found.state + step * motion, found.turns, there.load_parameters)
-            slopes = residual.slopes(multiplier)
-            through = residual.prescribed(slopes.by_state + weights)
-        gradient = Gradient(scene, slopes.by_values + through[0], slopes.by_load_parameters + through[1])
-        return [slopes.by_state, *(by_leaf(there, leaf, gradient).ravel() for leaf in inputs.leaves)]
+            derivatives = residual.derivatives(multiplier)
+            through = residual.prescribed(derivatives.by_state + weights)
+        gradient = Gradient(
+            scene, derivatives.by_values + through[0], derivatives.by_load_parameters + through[1]
+        )
+        return [derivatives.by_state, *(by_leaf(there, leaf, gradient).ravel() for leaf in inputs.leaves)]
 
     parts = at(0.0, multiplier, weights)
     rates = directional_derivative(

@@ -16,7 +16,7 @@ import numpy as np
 from ...errors import NoGradient
 from .factorized import Factorized
 from .leaf_gradient import by_leaf
-from .residual import Residual, Slopes
+from .residual import Derivatives, Residual
 
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Inputs, Leaf
@@ -142,20 +142,20 @@ class FrequencyAdjoint(EigenvalueAdjoint):
     def _gradient(self, k: int) -> tuple[Gradient, ...]:
         model, residual = self._inputs.scene._model, self._residual
         vector = self._vectors[:, k]
-        slopes = residual.bent(vector, vector)
+        derivatives = residual.hessian_derivatives(vector, vector)
         by_masses = -self._eigenvalues[k] * (model.points(vector) ** 2).sum(axis=1)
         if self._at_rest:
-            return (residual.by_inputs(slopes.at_fixed_state(), by_masses),)
-        return (residual.by_inputs(through_equilibrium(residual, slopes), by_masses),)
+            return (residual.by_inputs(derivatives.at_fixed_state(), by_masses),)
+        return (residual.by_inputs(through_equilibrium(residual, derivatives), by_masses),)
 
 
-def through_equilibrium(residual: Residual, slopes: Slopes) -> Slopes:
+def through_equilibrium(residual: Residual, derivatives: Derivatives) -> Derivatives:
     """Return the derivatives with respect to values and load parameters also through the equilibrium, which changes with
     them.
 
     Those by unknowns are left to what supports prescribe.
     """
-    return slopes.plus(1.0, residual.slopes(multiplier_of(residual, slopes.by_state)))
+    return derivatives.plus(1.0, residual.derivatives(multiplier_of(residual, derivatives.by_state)))
 
 
 def multiplier_of(residual: Residual, by_state: np.ndarray) -> np.ndarray:

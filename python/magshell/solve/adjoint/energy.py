@@ -167,7 +167,7 @@ class EnergyAdjoint:
             if not is_wanted:
                 found.append(None)
             elif leaf.name in POSITIONAL and leaf.owner is None:
-                of_unknowns = self.slopes(weights) if of_unknowns is None else of_unknowns
+                of_unknowns = self.weighted_gradient(weights) if of_unknowns is None else of_unknowns
                 found.append(of_unknowns[POSITIONAL.index(leaf.name)])
             else:
                 found.append(
@@ -180,7 +180,7 @@ class EnergyAdjoint:
         """The gradient of the sum by positions (n_v, 3) and by edge rotations (n_e,)."""
         return self.unknowns.split(self.gradient)
 
-    def slopes(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def weighted_gradient(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the gradient of the weighted sum by positions (n_v, 3) and by edge rotations (n_e,)."""
         if np.ptp(weights) == 0.0:
             return tuple(weights[0] * each for each in self.by_unknowns)
@@ -196,7 +196,8 @@ class EnergyAdjoint:
         by_weights: bool,
         wanted: Sequence[bool],
     ) -> tuple[np.ndarray | None, list[np.ndarray | None]]:
-        """Compute derivatives of m . g, with the gradient g of the weighted sum and a motion m in two arrays as `slopes`.
+        """Compute derivatives of m . g, with the gradient g of the weighted sum and a motion m in two arrays as
+        `weighted_gradient`.
 
         Returns those by the weights (n,), None unless they are asked for, and by the wanted leaves.
         """
@@ -208,7 +209,11 @@ class EnergyAdjoint:
                 found.append(None)
             elif leaf.name in POSITIONAL and leaf.owner is None:
                 if moved is None:
-                    product = weights[0] * (self.hessian @ motion) if is_sum else self._bent(weights, motion)
+                    product = (
+                        weights[0] * (self.hessian @ motion)
+                        if is_sum
+                        else self._hessian_product(weights, motion)
+                    )
                     moved = self.unknowns.split(product)
                 found.append(moved[POSITIONAL.index(leaf.name)])
             elif self._follows(leaf) or not is_sum:
@@ -220,9 +225,9 @@ class EnergyAdjoint:
             else:
                 of_values = self._by_values(weights[0] * motion) if of_values is None else of_values
                 found.append(by_leaf(self.inputs, leaf, of_values))
-        return self._works(motion) if by_weights else None, found
+        return self._gradient_products(motion) if by_weights else None, found
 
-    def _works(self, motion: np.ndarray) -> np.ndarray:
+    def _gradient_products(self, motion: np.ndarray) -> np.ndarray:
         """Return the products of a motion with the gradients of single energies, (n,)."""
         state, load_parameters = self.state(self.inputs.load_parameters), self.inputs.load_parameters
         with self.inputs.in_core():
@@ -231,7 +236,7 @@ class EnergyAdjoint:
                 [motion @ self._model.term_gradient(name, state, load_parameters) for name in names]
             )
 
-    def _bent(self, weights: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    def _hessian_product(self, weights: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Return the rate of the gradient of the weighted sum along a motion. Raises NoGradient where it is not smooth."""
         state, load_parameters = self.state(self.inputs.load_parameters), self.inputs.load_parameters
         length = self._relative_size(motion)

@@ -34,21 +34,21 @@ class _Energies(torch.autograd.Function):
             positional = [is_positional(leaf) for leaf in ctx.adjoint.inputs.leaves]
             asked = [each is not None for each in by_leaves]
             if any(is_asked and at for is_asked, at in zip(asked, positional, strict=True)):
-                slopes = _Slopes.apply(ctx.adjoint, ctx.dtype, by_energies, *ctx.leaves)
+                gradients = _WeightedGradient.apply(ctx.adjoint, ctx.dtype, by_energies, *ctx.leaves)
                 for k, leaf in enumerate(ctx.adjoint.inputs.leaves):
                     if asked[k] and positional[k]:
-                        by_leaves[k] = slopes[POSITIONAL.index(leaf.name)].to(ctx.leaves[k])
+                        by_leaves[k] = gradients[POSITIONAL.index(leaf.name)].to(ctx.leaves[k])
             chosen = [k for k, at in enumerate(positional) if asked[k] and not at]
             if chosen:
                 given = [by_leaves[k] for k in chosen]
-                connected = _SlopesByValues.apply(ctx.adjoint, chosen, by_energies, *given, *ctx.leaves)
+                connected = _GradientByValues.apply(ctx.adjoint, chosen, by_energies, *given, *ctx.leaves)
                 for k, each in zip(chosen, connected, strict=True):
                     by_leaves[k] = each
         return None, None, None, *by_leaves
 
 
-class _SlopesByValues(torch.autograd.Function):
-    """Gradients of weighted energies by some of the leaves that are values, which were computed, connected to all leaves."""
+class _GradientByValues(torch.autograd.Function):
+    """Computed gradients of weighted energies with respect to some leaves that are values, connected to all leaves."""
 
     @staticmethod
     def forward(
@@ -73,15 +73,19 @@ class _SlopesByValues(torch.autograd.Function):
         return None, None, by_weights, *(None for _ in ctx.chosen), *by_leaves
 
 
-class _Slopes(torch.autograd.Function):
-    """The gradient of the weighted sum of all energies by positions and by edge rotations, of the weights and leaves."""
+class _WeightedGradient(torch.autograd.Function):
+    """The gradient of the weighted sum of all energies with respect to positions and edge rotations, as a function of
+    weights and leaves.
+    """
 
     @staticmethod
     def forward(
         ctx: Any, adjoint: EnergyAdjoint, dtype: torch.dtype, weights: torch.Tensor, *leaves: torch.Tensor
     ) -> tuple[torch.Tensor, ...]:
         ctx.adjoint, ctx.weights, ctx.leaves = adjoint, weights, leaves
-        return tuple(torch.from_numpy(each).to(dtype=dtype) for each in adjoint.slopes(numbers_of(weights)))
+        return tuple(
+            torch.from_numpy(each).to(dtype=dtype) for each in adjoint.weighted_gradient(numbers_of(weights))
+        )
 
     @staticmethod
     def backward(ctx: Any, *motion: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
@@ -129,9 +133,9 @@ def energies_of(
     return _Energies.apply(adjoint, energies, dtype, *leaves)
 
 
-def slopes_of(
+def gradient_of(
     adjoint: EnergyAdjoint, dtype: torch.dtype, leaves: list[Any]
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return the gradient of the sum by positions and by edge rotations, as tensors connected to the leaves."""
+    """Return the gradient of the sum with respect to positions and edge rotations, as tensors connected to the leaves."""
     weights = torch.ones(adjoint.count, dtype=torch.float64)
-    return _Slopes.apply(adjoint, dtype, weights, *leaves)
+    return _WeightedGradient.apply(adjoint, dtype, weights, *leaves)

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 # an edge turns; and the fractions (1) of it that are tried until differences of sixth and eighth order agree. Tested by
 # test_frequencies_have_the_gradients_of_differences.
 _STEP, _SHORTER = 1 / 64, (1.0, 0.25, 0.1, 1e-2, 1e-3, 1e-4)
-# The error (1) of `bent`, a derivative by differences itself, over its largest entry of one kind. Tested by
+# The error (1) of `hessian_derivatives`, a derivative by differences itself, over its largest entry of one kind. Tested by
 # test_factors_have_the_gradients_of_differences.
 _OF_DIFFERENCES = 1e-11
 
 
-class Slopes(NamedTuple):
+class Derivatives(NamedTuple):
     """The derivatives of a number with respect to all unknowns of the core, all values and all load parameters.
 
     by_rest: those through the shape of bodies at rest, three numbers per node; empty unless rest positions are inputs.
@@ -43,20 +43,20 @@ class Slopes(NamedTuple):
     by_load_parameters: np.ndarray
     by_rest: np.ndarray = np.zeros(0)
 
-    def plus(self, factor: float, other: Slopes) -> Slopes:
+    def plus(self, factor: float, other: Derivatives) -> Derivatives:
         """Return the derivatives of the sum of this number and a multiple of another."""
-        return Slopes(*(mine + factor * theirs for mine, theirs in zip(self, other, strict=True)))
+        return Derivatives(*(mine + factor * theirs for mine, theirs in zip(self, other, strict=True)))
 
-    def times(self, factor: float) -> Slopes:
+    def times(self, factor: float) -> Derivatives:
         """Return the derivatives of a multiple of this number."""
-        return Slopes(*(factor * each for each in self))
+        return Derivatives(*(factor * each for each in self))
 
-    def with_state_at_rest(self) -> Slopes:
+    def with_state_at_rest(self) -> Derivatives:
         """Return the same for a state that is the rest shape: its nodes are those at rest, and its other unknowns zero."""
         nodes = self.by_state[: self.by_rest.size]
         return self.at_fixed_state()._replace(by_rest=self.by_rest + nodes)
 
-    def at_fixed_state(self) -> Slopes:
+    def at_fixed_state(self) -> Derivatives:
         """Return the same without the derivatives by unknowns."""
         return self._replace(by_state=np.zeros_like(self.by_state))
 
@@ -110,49 +110,52 @@ class Residual:
         self._prepare()
         return self._product(self.state, motion)
 
-    def slopes_at_fixed_state(self, motion: np.ndarray) -> Slopes:
+    def derivatives_at_fixed_state(self, motion: np.ndarray) -> Derivatives:
         """Return the derivatives of motion . g without those by unknowns, for which H need not be symmetric."""
         self._prepare()
         by_inputs = _core.vjp(self._model, self.state, self.load_parameters, motion, self.with_rest)
-        return Slopes(np.zeros_like(self.state), *by_inputs)
+        return Derivatives(np.zeros_like(self.state), *by_inputs)
 
-    def slopes(self, motion: np.ndarray) -> Slopes:
+    def derivatives(self, motion: np.ndarray) -> Derivatives:
         """Return the derivatives of motion . g at a fixed motion of all unknowns."""
         self._prepare()
-        return self._slopes(self.state, motion)
+        return self._derivatives(self.state, motion)
 
-    def bent(self, motion: np.ndarray, along: np.ndarray) -> Slopes:
+    def hessian_derivatives(self, motion: np.ndarray, along: np.ndarray) -> Derivatives:
         """Return the derivatives of along . H motion at fixed motions of all unknowns.
 
         Raises NoGradient where the forces are not smooth.
         """
 
-        def at(step: float) -> Slopes:
+        def at(step: float) -> Derivatives:
             self._prepare()
-            return self._slopes(self.state + step * along, motion)
+            return self._derivatives(self.state + step * along, motion)
 
         return self._rates(at, self._relative_size(along))
 
-    def bent_rates(self, motion: np.ndarray, along: np.ndarray, rate: np.ndarray) -> Slopes:
-        """Return the rates of `bent(motion, motion)` as the state moves along a motion and load parameters at a rate.
+    def hessian_derivative_rates(
+        self, motion: np.ndarray, along: np.ndarray, rate: np.ndarray
+    ) -> Derivatives:
+        """Return the rates of `hessian_derivatives(motion, motion)` as the state moves along a motion and load parameters
+        at a rate.
 
         Raises NoGradient where the forces are not smooth.
         """
 
-        def at(step: float) -> Slopes:
+        def at(step: float) -> Derivatives:
             there = self.at(self.state + step * along, self.load_parameters + step * rate)
-            return there.bent(motion, motion)
+            return there.hessian_derivatives(motion, motion)
 
         self._prepare()
         return self._rates(at, self._relative_size(along) or 1.0, _OF_DIFFERENCES)
 
     def _rates(
-        self, function: Callable[[float], Slopes], length: float, rounding: float = ROUNDING
-    ) -> Slopes:
+        self, function: Callable[[float], Derivatives], length: float, rounding: float = ROUNDING
+    ) -> Derivatives:
         """Return the derivative of a function of one number at 0, in steps of a fraction over this length."""
         parts, zero = self._parts, function(0.0)
         if length == 0.0:
-            return Slopes(*(np.zeros_like(each) for each in zero))
+            return Derivatives(*(np.zeros_like(each) for each in zero))
 
         def rows(step: float) -> np.ndarray:
             flat = np.concatenate(function(step))
@@ -170,29 +173,32 @@ class Residual:
         flat = np.concatenate([np.zeros_like(each) for each in zero])
         for row, part in zip(rates, parts, strict=True):
             flat[part] = row[: part.stop - part.start]
-        return Slopes(*np.split(flat, np.cumsum([each.size for each in zero])[:-1]))
+        return Derivatives(*np.split(flat, np.cumsum([each.size for each in zero])[:-1]))
 
     def prescribed(self, by_state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return derivatives by values and load parameters through what supports prescribe, from those by unknowns."""
         return _core.prescribed_vjp(self._model, self.state, self.load_parameters, by_state)
 
-    def by_inputs(self, slopes: Slopes, masses: np.ndarray | None = None) -> Gradient:
+    def by_inputs(self, derivatives: Derivatives, masses: np.ndarray | None = None) -> Gradient:
         """Return the gradient by values and load parameters, also through what supports prescribe.
 
         masses: the derivatives by the masses of vertices.
         """
-        through = self.prescribed(slopes.by_state)
+        through = self.prescribed(derivatives.by_state)
         others = {} if masses is None else {"mass": masses}
         rest = None
         if self.with_rest:
             model = self._model
-            held = slopes.by_state - model.expand(model.reduce(slopes.by_state))
-            rest = [_core.at_nodes(model, each) for each in (slopes.by_rest, held)]
-        by_values, by_load_parameters = slopes.by_values + through[0], slopes.by_load_parameters + through[1]
+            held = derivatives.by_state - model.expand(model.reduce(derivatives.by_state))
+            rest = [_core.at_nodes(model, each) for each in (derivatives.by_rest, held)]
+        by_values, by_load_parameters = (
+            derivatives.by_values + through[0],
+            derivatives.by_load_parameters + through[1],
+        )
         return Gradient(self.inputs.scene, by_values, by_load_parameters, others, rest=rest)
 
-    def _slopes(self, state: np.ndarray, motion: np.ndarray) -> Slopes:
-        return Slopes(
+    def _derivatives(self, state: np.ndarray, motion: np.ndarray) -> Derivatives:
+        return Derivatives(
             self._product(state, motion),
             *_core.vjp(self._model, state, self.load_parameters, motion, self.with_rest),
         )
@@ -210,7 +216,9 @@ class Residual:
 
     @property
     def _parts(self) -> list[slice]:
-        """The entries of flat Slopes of one unit each: unknowns of vertices and others, each value, each load parameter."""
+        """The entries of flat Derivatives of one unit each: unknowns of vertices and others, each value, each load
+        parameter.
+        """
         scene, n = self.inputs.scene, len(self.state)
         vertices = 3 * scene._bodies.n_points
         directions = vertices + 3 * len(scene._constraints.directions)

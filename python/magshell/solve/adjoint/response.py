@@ -178,13 +178,19 @@ class ResponseAdjoint:
         here, after = self._here, self._after.load_parameters
         fixed = self._at_rest and not here.with_rest
         multiplier = self._solved(self._model.reduce(weights))
-        total, by_after = here.bent(multiplier, self._response).times(-1.0), np.zeros_like(after)
+        total, by_after = (
+            here.hessian_derivatives(multiplier, self._response).times(-1.0),
+            np.zeros_like(after),
+        )
         for load in self._loads:
             there = here.at(here.state, load.load_parameters(here.load_parameters, after))
-            slopes = there.slopes_at_fixed_state(multiplier) if fixed else there.slopes(multiplier)
-            by_after = by_after + load.weight * load.after * slopes.by_load_parameters
+            derivatives = (
+                there.derivatives_at_fixed_state(multiplier) if fixed else there.derivatives(multiplier)
+            )
+            by_after = by_after + load.weight * load.after * derivatives.by_load_parameters
             total = total.plus(
-                load.weight, slopes._replace(by_load_parameters=load.before * slopes.by_load_parameters)
+                load.weight,
+                derivatives._replace(by_load_parameters=load.before * derivatives.by_load_parameters),
             )
         by_values, before, further = self._by_motion(weights - here.product(multiplier))
         total = total._replace(
@@ -193,7 +199,7 @@ class ResponseAdjoint:
         if self._at_rest:
             total = total.with_state_at_rest()
         else:
-            total = total.plus(1.0, here.slopes(self._solved(-self._model.reduce(total.by_state))))
+            total = total.plus(1.0, here.derivatives(self._solved(-self._model.reduce(total.by_state))))
         of_after = total.at_fixed_state()._replace(by_load_parameters=by_after + further)
         return here.by_inputs(total), here.by_inputs(of_after)
 
@@ -224,7 +230,7 @@ class ResponseAdjoint:
         forces, motion, gradient, increment = np.sum([self._rates(*each) for each in changes], axis=0)
         if np.any(gradient) or np.any(increment):
             moved = increment - self._solved(reduce(gradient + here.product(increment)))
-            forces = forces - here.bent(self._response, moved).by_state
+            forces = forces - here.hessian_derivatives(self._response, moved).by_state
             for load in self._loads:
                 there = here.at(here.state, load.load_parameters(here.load_parameters, after))
                 forces = forces + load.weight * there.product(moved)

@@ -203,9 +203,9 @@ def forces(
     inputs = at.adjoint.inputs
     if not inputs.leaves:
         return Forces(*(like(-each, *inputs.given) for each in at.adjoint.by_unknowns))
-    from ..adjoint.energy_autograd import slopes_of
+    from ..adjoint.energy_autograd import gradient_of
 
-    return Forces(*(-each for each in slopes_of(at.adjoint, at.dtype, inputs.tensors)))
+    return Forces(*(-each for each in gradient_of(at.adjoint, at.dtype, inputs.tensors)))
 
 
 @solve_entry
