@@ -30,6 +30,40 @@ Index largest(const double* column, Index first, Index size, Index skip) {
     return best;
 }
 
+// Returns the largest |entry| of a column from `first` on.
+double largest_size(const double* column, Index first, Index size) {
+    double found = 0.0;
+    Index i = first;
+    for (; i < size && i % slabs::width != 0; ++i) found = std::max(found, std::abs(column[i]));
+    Lanes sizes{};
+    for (; i + slabs::width <= size; i += slabs::width) sizes.raise_to_magnitude(lanes(column + i));
+    for (; i < size; ++i) found = std::max(found, std::abs(column[i]));
+    for (Index lane = 0; lane < slabs::width; ++lane) found = std::max(found, sizes[lane]);
+    return found;
+}
+
+// Divides a column below its pivot; w receives what it was. Returns the largest |l_ik w_ik|.
+double divide_column(double* column, double inverse, double* w, Index first, Index size) {
+    double growth = 0.0;
+    const auto divide = [&](Index i) {
+        w[i] = column[i];
+        column[i] *= inverse;
+        growth = std::max(growth, std::abs(w[i] * column[i]));
+    };
+    Index i = first;
+    for (; i < size && i % slabs::width != 0; ++i) divide(i);
+    Lanes products{};
+    for (; i + slabs::width <= size; i += slabs::width) {
+        const Lanes old = lanes(column + i), divided = old * inverse;
+        lanes(w + i) = old;
+        lanes(column + i) = divided;
+        products.raise_to_magnitude(old * divided);
+    }
+    for (; i < size; ++i) divide(i);
+    for (Index lane = 0; lane < slabs::width; ++lane) growth = std::max(growth, products[lane]);
+    return growth;
+}
+
 enum class PivotSize { one, two };
 
 // Chooses a pivot by Bunch and Kaufman and moves it to row k (and k + 1). alpha balances the growth of 1x1 and
@@ -39,11 +73,10 @@ PivotSize choose_pivot(PivotBlock& block, Index k) {
     constexpr double alpha = 0.6403882032022076;
     if (k + 1 == block.size) return PivotSize::one;
     const double* column = block.entries + k * stride;
-    const double diagonal = std::abs(column[k]);
-    const Index r = largest(column, k + 1, block.size, -1);
-    const double beside = std::abs(column[r]);
+    const double diagonal = std::abs(column[k]), beside = largest_size(column, k + 1, block.size);
     if (diagonal >= alpha * beside) return PivotSize::one;
 
+    const Index r = largest(column, k + 1, block.size, -1);
     const double* other = block.entries + r * stride;
     const double beside_other = std::abs(other[largest(other, k, block.size, r)]);
     if (diagonal * beside_other >= alpha * beside * beside) return PivotSize::one;
@@ -86,12 +119,8 @@ void PivotBlock::factorize(Pivots pivots, PivotTally& tally) {
             pivots.coupling[k] = 0.0;
             tally.negative += pivot < 0.0;
             const double inverse = 1.0 / pivot;
-            for (Index i = k + 1; i < size; ++i) {
-                w[0][i] = column[i];
-                column[i] *= inverse;
-                tally.growth = std::max(tally.growth, std::abs(w[0][i] * column[i]));
-            }
-            tally.growth = std::max(tally.growth, std::abs(pivot));
+            const double growth = divide_column(column, inverse, w[0], k + 1, size);
+            tally.growth = std::max({tally.growth, growth, std::abs(pivot)});
             subtract_outer(*this, k + 1, column, w[0]);
             column[k] = 1.0;
             k += 1;
