@@ -10,7 +10,7 @@ import numpy as np
 
 from .report import print_table
 
-CORES = (4, 8, 16, 64)
+CORES = (2, 4, 8, 16, 64)
 BLOCK = 32  # [columns] that a front eliminates at once (block_columns in pivot_block.h)
 PART = 96  # [rows] of a parallel task within a front (12 slabs of 8 in front.cpp)
 

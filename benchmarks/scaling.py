@@ -15,7 +15,7 @@ import magshell as ms
 from magshell import _core
 from magshell.model.scene.solve_inputs import Inputs
 
-from . import batches, busy_machine, core_limits, skeleton_scaling, solid_scaling
+from . import batches, busy_machine, core_limits, factor_rates, skeleton_scaling, solid_scaling
 from .ratios import note
 from .report import add_rounds, bar, chosen, print_table
 from .statics import strongly_bent
@@ -82,6 +82,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     _print_times(one, two, exponents)
     _print_memory(one, exponents)
     _print_orderings(one)
+    factor_rates.print_rates(one, factor_rates.product_rate(options.quick))
     core_limits.print_limits(one)
     _print_targets(one, two, exponents)
     if ended is not None:
