@@ -136,7 +136,9 @@ from .solve.dynamics.simulate import simulate
 from .solve.dynamics.trajectory import MotionState, Trajectory
 from .solve.dynamics.trajectory_batch import TrajectoryBatch
 from .solve.linear.buckling import Buckling, linear_buckling
-from .solve.linear.response import LinearResponse, linear_response
+from .solve.linear.response import linear_response
+from .solve.linear.response_batch import LinearResponseBatch
+from .solve.linear.single_response import LinearResponse
 from .solve.linear.vibration import VibrationModes, vibration_modes
 from .solve.options import (
     SDIRK2,
@@ -213,6 +215,7 @@ __all__ = [
     "JointResult",
     "LargeStrainWarning",
     "LinearResponse",
+    "LinearResponseBatch",
     "Link",
     "LiveView",
     "LoopClosure",

@@ -311,6 +311,8 @@ def _solves(s: Sample) -> Iterator[Call]:
         cost=2,
     )
     yield Call("linear_response", ms.linear_response, {**magnetic, "equilibrium": None})
+    of_members = {**magnetic, "applied_flux_density": fields, "batch": 2, "threads": 1}
+    yield Call("linear_response of a batch", ms.linear_response, of_members)
     yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "equilibrium": None, "modes": 1}, cost=2)
     modes = {"scene": s.scene, "equilibrium": s.rest, "count": 2, "mass": "consistent"}
     yield Call("vibration_modes", ms.vibration_modes, modes, cost=2)
@@ -371,6 +373,13 @@ def _solves(s: Sample) -> Iterator[Call]:
         "WarmStart",
         lambda start, **a: ms.WarmStart(s.magnetic, start=start, solver=quick)(**a),
         {"start": None, **{k: v for k, v in magnetic.items() if k != "scene"}},
+    )
+    yield Call(
+        "WarmStart of a batch",
+        lambda start, batch, threads, **a: ms.WarmStart(
+            s.magnetic, start=start, solver=quick, batch=batch, threads=threads
+        )(**a),
+        {"start": None, **{k: v for k, v in of_members.items() if k != "scene"}},
     )
     yield Call("EquilibriumPath.equilibrium", s.path.equilibrium, {"index": 0})
     yield Call("EquilibriumSet", ms.EquilibriumSet, {"cases": [s.rest, s.rest]})

@@ -45,6 +45,7 @@ NOT_CALLED = {
     "jax.JaxEquilibrium": "a result",
     "jax.equilibrium": "needs JAX, an extra; tests/jax refuses bad input",
     "TrajectoryBatch": "a result",
+    "LinearResponseBatch": "a result",
     "SolveLog": "a result",
     "SolveStep": "a result",
     "Strains": "a result",

@@ -114,7 +114,11 @@ def test_views_whose_sign_is_pending_are_taken(scene):
     assert torch.equal(equilibrium(scene, negative), equilibrium(scene, STRENGTH))
 
 
-@pytest.mark.parametrize("solve", [motion, linear])
+def warm_start(scene, magnetization):
+    return ms.WarmStart(scene)(remanent_magnetization=magnetization, applied_flux_density=FIELD).positions
+
+
+@pytest.mark.parametrize("solve", [motion, warm_start])
 def test_batches_of_designs_are_refused_by_name(scene, solve):
     with pytest.raises(ValueError, match=r"remanent_magnetization \[A/m\] is inside torch\.vmap.*loop"):
         torch.vmap(lambda magnetization: solve(scene, magnetization))(STRENGTH.repeat(2, 1))

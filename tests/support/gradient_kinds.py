@@ -6,6 +6,7 @@ import numpy as np
 from adjoint_scenes import BENDINGS, DEFAULTS, DIPOLES, MAGNETIZATION, MESH, N_V, everything
 from gradient_kinds_actuators import actuated_at_rest, actuated_in_motion
 from gradient_kinds_attached import ATTACHED_MAKERS
+from gradient_kinds_batch import BATCH_MAKERS
 from gradient_kinds_bodies import (
     magnetized_solid_at_rest,
     magnetized_solid_in_motion,
@@ -393,6 +394,7 @@ MAKERS = {
     "susceptible shells in motion": lambda: susceptible_shells(True),
     **LINEAR_MAKERS,
     **ATTACHED_MAKERS,
+    **BATCH_MAKERS,
 }
 
 

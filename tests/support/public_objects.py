@@ -395,6 +395,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         "touching": rest.contact_state(floor),
         "reaction": rest.reaction(clamp),
         "response": ms.linear_response(scene, **asked),
+        "batch of responses": ms.linear_response(scene, **asked, batch=2),
         "modes": ms.vibration_modes(scene, rest, count=1),
         "weld": welded,
         "weld of solids": joined,

@@ -16,10 +16,9 @@ if TYPE_CHECKING:
 class BatchResult:
     """The members of a batch. `_members` holds the result of each, None where it failed; `failed` the errors."""
 
-    positions: Any
+    edge_rotations: Any
     failed: dict[int, Any]
     _members: tuple[Any, ...]
-    _rest: Any  # (k or 1, ..., n_v, 3) m, the rest positions, if some were given
 
     _as_given = ("failed",)
 
@@ -27,11 +26,6 @@ class BatchResult:
     def converged(self) -> np.ndarray:
         """Return whether each member was solved to its end, (k,)."""
         return np.array([each is not None for each in self._members])
-
-    @property
-    def displacements(self) -> Computed:
-        """The displacements from the rest shape, in the shape of `positions`, m."""
-        return displacements_of(self) if self._rest is None else self.positions - self._rest
 
     def __len__(self) -> int:
         return len(self._members)
@@ -45,7 +39,19 @@ class BatchResult:
 
     def __repr__(self) -> str:
         failed = ", ".join(f"{k} ({type(error).__name__})" for k, error in self.failed.items())
-        kind = "tensors" if is_tensor(self.positions) else "arrays"
+        kind = "tensors" if is_tensor(self.edge_rotations) else "arrays"
         return f"{type(self).__name__}: {len(self)} members as {kind}; " + (
             f"failed: {failed}" if failed else "none failed"
         )
+
+
+class BatchOfPositions(BatchResult):
+    """The members of a batch whose results hold positions."""
+
+    positions: Any
+    _rest: Any  # (k or 1, ..., n_v, 3) m, the rest positions, if some were given
+
+    @property
+    def displacements(self) -> Computed:
+        """The displacements from the rest shape, in the shape of `positions`, m."""
+        return displacements_of(self) if self._rest is None else self.positions - self._rest

@@ -42,6 +42,12 @@ class BatchValue:
         row = {"batched": member, "repeated": 0, "shared": None}[self.kind]
         return self.value if row is None else self.value[row]
 
+    def copied(self, member: int) -> Any:
+        """Return the numbers of one member as a new tensor that requires a gradient."""
+        import torch
+
+        return torch.tensor(np.array(self.of(member)), dtype=torch.float64, requires_grad=True)
+
     def add(self, total: np.ndarray, member: int, part: np.ndarray) -> None:
         """Add the gradient by one member's value to the gradient by the value as given."""
         if self.kind == "batched":
@@ -120,11 +126,8 @@ class BatchAxis:
         owners: dict[Any, dict[str, Any]] = {owner: {} for owner in self._owners}
         leaves = []
         for each in self.values:
-            value = each.of(member)
+            value = each.copied(member) if each.followed else each.of(member)
             if each.followed:
-                import torch
-
-                value = torch.tensor(np.array(value), dtype=torch.float64, requires_grad=True)
                 leaves.append(value)
             if each.owner is None:
                 keywords[each.name] = value

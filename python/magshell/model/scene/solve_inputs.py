@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -165,6 +165,17 @@ class Inputs:
         """Return a copy of these inputs with other values of the scene."""
         there = copy.copy(self)
         there.values = values
+        return there
+
+    def with_tensors(self, tensors: Sequence[Any]) -> Inputs:
+        """Return a copy of these inputs whose leaves are other tensors, one for each."""
+        pairs = zip(self.leaves, tensors, strict=True)
+        return self.with_leaves([leaf._replace(tensor=each) for leaf, each in pairs])
+
+    def with_leaves(self, leaves: list[Leaf]) -> Inputs:
+        """Return a copy of these inputs with other leaves."""
+        there = copy.copy(self)
+        there.leaves = leaves
         return there
 
     def without_tensors(self) -> Inputs:

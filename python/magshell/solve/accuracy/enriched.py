@@ -16,8 +16,8 @@ from ...mesh.finer import FinerMesh
 from ...model.loads.pressure import Pressure
 from ...model.scene.finer_scene import finer_scene
 from ...model.scene.solve_inputs import Inputs
-from ..linear.response import LinearResponse
 from ..linear.rest import RestStiffness
+from ..linear.single_response import LinearResponse
 from ..options import MixedNewton
 from ..statics.equilibrium import Equilibrium
 from ..statics.single_solve import Search, Solution, find, inputs_of, solve

@@ -17,7 +17,7 @@ from ...mesh.finer_solid import finer_solid
 from ...model.scene.finer_scene import refuse_what_stays
 from ...model.solids.solid import Solid
 from ...model.supports.supports import SymmetryPlane
-from ..linear.response import LinearResponse
+from ..linear.single_response import LinearResponse
 from ..statics.equilibrium import Equilibrium
 from .contributions import contributions, summing_to
 from .enriched import FinerSolution, finer_solution, positions_of

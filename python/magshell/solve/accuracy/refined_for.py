@@ -15,7 +15,8 @@ from ..._runtime.solver_entry_point import solve_entry
 from ...errors import NotConverged
 from ...mesh.finer import bisected
 from ...model.scene.finer_scene import finer_scene, refuse_what_stays
-from ..linear.response import LinearResponse, linear_response
+from ..linear.response import linear_response
+from ..linear.single_response import LinearResponse
 from ..statics.equilibrium import Equilibrium
 from .enriched import equilibrium_on, load_keywords, positions_of
 from .error_estimate import ErrorEstimate, check_result, error_estimate, planes_of

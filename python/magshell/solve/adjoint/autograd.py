@@ -379,7 +379,7 @@ class _Mapped(torch.autograd.Function):
     @staticmethod
     def jvp(ctx: Any, *tangents: torch.Tensor | None) -> tuple[torch.Tensor, ...]:
         raise NoGradient(
-            "no tangents inside torch.func.vmap: ms.equilibrium(..., batch=k) has them, by torch.func.jvp around it"
+            "no tangents inside torch.func.vmap: batch=k has them, by torch.func.jvp around the solve"
         )
 
     @staticmethod

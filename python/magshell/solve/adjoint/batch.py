@@ -12,12 +12,13 @@ import numpy as np
 
 from ..._input.tensors import dtype_like, is_tensor, like
 from ..._runtime.worker_threads import Outcome, WorkerThreads
-from ...errors import Interrupted, NoGradient, NotConverged
+from ...errors import DesignRejected, Interrupted, NoGradient
 from ...model.scene.batch_axis import BatchAxis, BatchValue
 
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene
     from .dynamic import MotionAdjoint
+    from .response import ResponseAdjoint
     from .static import Adjoint
 
 
@@ -30,7 +31,7 @@ class Member(NamedTuple):
 
     result: Any
     arrays: tuple[np.ndarray, ...]
-    adjoint: Adjoint | MotionAdjoint
+    adjoint: Adjoint | MotionAdjoint | ResponseAdjoint
     leaves: list[Any]
     tensors: list[Any]
 
@@ -162,12 +163,15 @@ def solve_members(
     solve: Callable[[int, Callable[[], None]], Member],
     report: Callable[[float, float], None] | None,
     missing: Callable[[], tuple[np.ndarray, ...]],
+    failures: tuple[type[BaseException], ...] = (DesignRejected, Interrupted),
+    further: Sequence[BatchValue] = (),
 ) -> Solved:
     """Solve all members over threads and stack their results.
 
     solve: function of a member, and of a function that raises KeyboardInterrupt once the batch is to end, which a solve
     calls now and then. report: called with the fraction of the members that are done. missing: the arrays that
-    stand for a member if all fail. Raises the first error that is neither NotConverged nor an interrupt.
+    stand for a member if all fail. failures: the errors by which a member fails; any other one is raised. further: values
+    besides those of the axis by which gradients are computed, before these among the tensors of a member.
     """
     stopped, lock, done = threading.Event(), threading.Lock(), [0]
 
@@ -191,18 +195,19 @@ def solve_members(
         if each.result is None
     }
     for k, error in failed.items():
-        if not isinstance(error, NotConverged | Interrupted):
+        if not isinstance(error, failures):
             raise (
                 ValueError(f"member {k} of {axis.members}: {error}")
                 if isinstance(error, ValueError)
                 else error
             )
-    adjoint = BatchAdjoint(on, axis.followed, members)
-    return Solved(members, _stacked(axis, members, adjoint, missing), failed, adjoint, interrupt)
+    adjoint = BatchAdjoint(on, [*(each for each in further if each.followed), *axis.followed], members)
+    values = [*further, *axis.values]
+    return Solved(members, _stacked(values, members, adjoint, missing), failed, adjoint, interrupt)
 
 
 def _stacked(
-    axis: BatchAxis,
+    values: list[BatchValue],
     members: list[Member | None],
     adjoint: BatchAdjoint,
     missing: Callable[[], tuple[np.ndarray, ...]],
@@ -212,9 +217,9 @@ def _stacked(
     of_failed = tuple(np.full(np.shape(each), np.nan) for each in (missing() if first is None else first))
     rows = [of_failed if each is None else each.arrays for each in members]
     arrays = tuple(np.stack(each) for each in zip(*rows, strict=True))
-    tensors = [each.value for each in axis.values if is_tensor(each.value)]
-    if not axis.followed:
+    tensors = [each.value for each in values if is_tensor(each.value)]
+    if not adjoint.values:
         return tuple(like(array, *tensors) for array in arrays)
     from .autograd import solved
 
-    return solved(adjoint, arrays, dtype_like(*tensors), [each.value for each in axis.followed])
+    return solved(adjoint, arrays, dtype_like(*tensors), [each.value for each in adjoint.values])

@@ -80,8 +80,12 @@ class Residual:
         self.state: np.ndarray = state
         self.load_parameters: np.ndarray = load_parameters
         self.angle_branches: list[list[float]] = angle_branches
-        self._model = inputs.scene._model
         self.with_rest: bool = any(leaf.name == REST and leaf.owner is not None for leaf in inputs.leaves)
+
+    @property
+    def _model(self) -> _core.Model:
+        """The model of the core that this thread uses."""
+        return self.inputs.scene._model
 
     def at(self, state: np.ndarray, load_parameters: np.ndarray) -> Residual:
         """Return the same at another state and other load parameters."""

@@ -83,10 +83,14 @@ class ResponseAdjoint:
         self._here, self._after, self._response, self._refusal = residual, inputs, response, refusal
         self._solve, self._leaves, self._at_rest = solve, leaves, at_rest
         self._loads = _QUADRATIC if quadratic else _LINEAR
-        self._model = inputs.scene._model
         layout = inputs.scene._load_parameter_layout
         of_supports = layout.of(np.arange(layout.size), "scene", "support_factor")
         self._support_factor = int(np.ravel(of_supports)[0])
+
+    @property
+    def _model(self) -> _core.Model:
+        """The model of the core that this thread uses."""
+        return self._after.scene._model
 
     @property
     def tensors(self) -> list[object]:

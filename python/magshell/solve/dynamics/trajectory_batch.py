@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._runtime.frozen import immutable
-from ...model.results.batch_result import BatchResult
+from ...model.results.batch_result import BatchOfPositions
 
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class TrajectoryBatch(BatchResult):
+class TrajectoryBatch(BatchOfPositions):
     """The motions of the k members of a batch, of ms.simulate(..., batch=k).
 
     times: (n,) s, of the recorded states. positions: (k, n, n_v, 3) m; velocities: (k, n, n_v, 3) m/s; edge_rotations:

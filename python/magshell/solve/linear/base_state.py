@@ -120,12 +120,15 @@ class StiffnessAbout(Stiffness):
     """
 
     def __init__(self, equilibrium: Equilibrium):
+        self._equilibrium = equilibrium
         set_state(equilibrium)
-        model = equilibrium.scene._model
-        super().__init__(model, equilibrium._state, equilibrium._load_parameters, "at the equilibrium")
+        super().__init__(
+            equilibrium.scene, equilibrium._state, equilibrium._load_parameters, "at the equilibrium"
+        )
 
     def response(self, inputs: Inputs) -> np.ndarray:
         """Return du of all degrees of freedom for load parameters that change from c to c1: K du = g(c) - g(c1) - K dm."""
+        set_state(self._equilibrium)  # in the model of this thread
         model, layout = self._model, inputs.scene._load_parameter_layout
         further = inputs.load_parameters - self.load_parameters
         moved = model.prescribed_rate(self.load_parameters) * layout.of(further, "scene", "support_factor")

@@ -2,77 +2,50 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-
-from ..._input.tensors import detached, dtype_like, is_tensor, like, plain_arrays
-from ..._runtime.frozen import immutable
-from ..._runtime.mixins import PlotMixin
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
-from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
-from ...model.scene.solve_inputs import Inputs
-from ...model.scene.values import Values
-from ..adjoint.response import ResponseAdjoint
+from ..adjoint.mapped import is_mapped
 from ..statics.equilibrium import Equilibrium
-from .base_state import StiffnessAbout, asked_inputs, leaves_of, residual_of
-from .rest import RestStiffness, forces_at_rest
+from .response_batch import LinearResponseBatch, map_responses, respond_in_batch
+from .single_response import LinearResponse, respond
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Computed, Numbers
+    from ..._input.kinds import Numbers
 
 
-@immutable
-@dataclass(frozen=True, repr=False)
-class LinearResponse(PlotMixin):
-    """The deflection of a scene by linear theory, proportional to the load parameters. It is not an equilibrium.
-
-    displacements: (n_v, 3) m, from the rest shape, or from the equilibrium that was given; edge_rotations: (n_e,) rad, zero
-        where an edge has none. Tensors if inputs are tensors.
-    equilibrium: that one, or None. factorizations: one.
-    """
-
-    scene: Scene
-    displacements: Any
-    edge_rotations: Any
-    factorizations: int
-    wall_time: float
-    equilibrium: Equilibrium | None = None
-    _values: Any = field(repr=False, default=None)
-    _load_parameters: Any = field(repr=False, default=None)
-    _rest: Any = field(repr=False, default=None)  # (n_v, 3) m, the rest positions, if a tensor was given
-
-    def __getstate__(self) -> dict[Any, Any]:
-        """Return the data of a copy or another process: tensors as arrays, without their gradients."""
-        values = None if self._values is None else self._values.to_state()
-        return {**plain_arrays(vars(self)), "_values": values}
-
-    def __setstate__(self, state: dict[Any, Any]) -> None:
-        stored = state["_values"]
-        values = None if stored is None else Values.from_state(state["scene"], stored)
-        PlotMixin.__setstate__(self, {**state, "_values": values})
-
-    @property
-    def positions(self) -> Computed:
-        """The positions, (n_v, 3) m; accurate for small displacements only."""
-        from_, of = self._rest, self.displacements
-        if self.equilibrium is not None:
-            from_ = self.equilibrium.positions
-        elif from_ is None:
-            from_ = self.scene.mesh.rest_positions
-        if is_tensor(of):
-            return of + (from_ if is_tensor(from_) else of.new_tensor(np.array(from_)))
-        return from_ + of
-
-    def __repr__(self) -> str:
-        moved = float(np.linalg.norm(detached(self.displacements), axis=1).max(initial=0.0))
-        return f"LinearResponse: largest displacement {moved:.4g} m, {self.wall_time:.3g} s"
-
-
+@overload
+def linear_response(
+    scene: Scene,
+    equilibrium: Equilibrium | None = None,
+    *,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    support_factor: float = 1.0,
+    values: dict[Any, Any] | None = None,
+    batch: None = None,
+    threads: int | None = None,
+) -> LinearResponse: ...
+@overload
+def linear_response(
+    scene: Scene,
+    equilibrium: Equilibrium | None = None,
+    *,
+    remanent_magnetization: Numbers | None = None,
+    applied_flux_density: Numbers | None = None,
+    load_factor: float = 1.0,
+    gravity_factor: float = 1.0,
+    field_factor: float = 1.0,
+    support_factor: float = 1.0,
+    values: dict[Any, Any] | None = None,
+    batch: int,
+    threads: int | None = None,
+) -> LinearResponseBatch: ...
 @solve_entry
 def linear_response(
     scene: Scene,
@@ -85,7 +58,9 @@ def linear_response(
     field_factor: float = 1.0,
     support_factor: float = 1.0,
     values: dict[Any, Any] | None = None,
-) -> LinearResponse:
+    batch: int | None = None,
+    threads: int | None = None,
+) -> LinearResponse | Any:  # LinearResponseBatch of a batch
     """Compute the deflection to first order in the loads, by one factorization of the stiffness at the rest shape.
 
     The stiffness is that of the unloaded scene. Loads and fields act as the forces they are at rest, without the stiffness
@@ -111,6 +86,9 @@ def linear_response(
 
     {keywords}
     values: as in ms.equilibrium.
+    batch, threads: as in ms.equilibrium, without load cases. The result is a LinearResponseBatch; a member whose stiffness
+        is not positive definite is in `failed`. About an equilibrium all members share one factorization. Inside
+        torch.func.vmap a response becomes such a batch.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(20, 4))
@@ -122,59 +100,12 @@ def linear_response(
     0.04
     """
     arguments = given_to("linear_response", locals())
-    began = time.perf_counter()
-    scene, arguments["values"] = reshaped(scene, arguments["values"], no_gradient_with=())
-    inputs = asked_inputs(scene, equilibrium, arguments)
-    at_rest = forces_at_rest(inputs) if equilibrium is None else None
-    with inputs.in_core():
-        if equilibrium is None:
-            stiffness: RestStiffness | StiffnessAbout = RestStiffness(inputs)
-            change = stiffness.response(inputs, at_rest)
-        else:
-            stiffness = StiffnessAbout(equilibrium)
-            change = stiffness.response(inputs)
-    displacements, edge_rotations = _results(inputs, equilibrium, stiffness, change)
-    return LinearResponse(
-        scene=scene,
-        displacements=displacements,
-        edge_rotations=edge_rotations,
-        factorizations=1,
-        wall_time=time.perf_counter() - began,
-        equilibrium=equilibrium,
-        _values=inputs.values,
-        _load_parameters=inputs.load_parameters,
-        _rest=inputs.given_rest,
-    )
-
-
-def _results(
-    inputs: Inputs,
-    equilibrium: Equilibrium | None,
-    stiffness: RestStiffness | StiffnessAbout,
-    change: np.ndarray,
-) -> tuple[Any, Any]:
-    """Return the displacements and the edge rotations of a response, connected to the inputs that require a gradient."""
-    model, leaves = inputs.scene._model, leaves_of(inputs, equilibrium)
-    arrays = (np.array(model.positions(change)), np.array(model.edge_rotations(change)))
-    given = inputs.given if equilibrium is None else [*inputs.given, equilibrium.positions]
-    if not leaves:
-        return like(arrays[0], *given), like(arrays[1], *given)
-    from ..adjoint.autograd import solved
-
-    refusal = ""
-    if equilibrium is not None and equilibrium.load_fraction < 1.0:
-        refusal = (
-            f"no derivative here: the equilibrium got {equilibrium.load_fraction:.3g} of the way to its loads"
-        )
-    adjoint = ResponseAdjoint(
-        residual_of(inputs, equilibrium),
-        inputs,
-        change,
-        stiffness.solve,
-        leaves,
-        at_rest=equilibrium is None,
-        quadratic=equilibrium is not None and inputs.scene.has_susceptible_shells,
-        refusal=refusal,
-    )
-    displacements, edge_rotations = solved(adjoint, arrays, dtype_like(*given), adjoint.tensors)
-    return displacements, edge_rotations
+    if is_mapped(arguments):
+        if batch is not None:
+            raise ValueError("batch and torch.func.vmap are both axes of members: take one of them")
+        return map_responses(scene, equilibrium, arguments)
+    if batch is not None:
+        return respond_in_batch(scene, equilibrium, arguments, batch, threads)
+    if threads is not None:
+        raise ValueError("threads is the number of threads of a batch: give batch=k, or ms.set_num_threads")
+    return respond(scene, equilibrium, arguments)

@@ -27,9 +27,7 @@ class RestStiffness(Stiffness):
         scene = inputs.scene
         refuse_springs(inputs)
         refuse_what_acts(inputs)
-        super().__init__(
-            scene._model, scene._model.rest_state(), scene._load_parameter_layout.zeros(), "at rest"
-        )
+        super().__init__(scene, scene._model.rest_state(), scene._load_parameter_layout.zeros(), "at rest")
 
     def response(self, inputs: Inputs, at_rest: np.ndarray | None = None) -> np.ndarray:
         """Return du of all degrees of freedom: K du = g(0) - g(c) - K dm, with dm the motion of supports and motors.

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import functools
+import threading
 
 import numpy as np
 import scipy
 
 from ... import _core
+from ...model.scene.scene import Scene
 from ..adjoint.factorized import Factorized, analyzed, times_low_rank
 
 
+class IndefiniteStiffness(ValueError):
+    """An error for a stiffness that is not positive definite, of which linear theory has no answer."""
+
+
 class _Factorized(Factorized):
-    """A factorized positive definite matrix. Raises ValueError if it is not positive definite.
+    """A factorized positive definite matrix. Raises IndefiniteStiffness if it is not positive definite.
 
     where: the state in words, for that error.
     """
@@ -32,9 +38,9 @@ class _Factorized(Factorized):
 
 
 def refuse_indefinite(report: _core.FactorReport, size: int, where: str) -> None:
-    """Raise ValueError if a factorization has shown that the matrix is not positive definite."""
+    """Raise IndefiniteStiffness if a factorization has shown that the matrix is not positive definite."""
     if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
-        raise ValueError(
+        raise IndefiniteStiffness(
             f"the stiffness {where} is not positive definite ({report.negative_pivots} negative and "
             f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: add supports"
         )
@@ -43,17 +49,23 @@ def refuse_indefinite(report: _core.FactorReport, size: int, where: str) -> None
 class Stiffness:
     """The Hessian K of a scene at a state with these load parameters, of the free degrees of freedom (n,).
 
-    The core has to hold the values of the solve. K is assembled and factorized once, when it is first needed; ValueError if
-    it is not positive definite then.
+    The core has to hold the values of the solve. K is assembled and factorized once, when it is first needed;
+    IndefiniteStiffness if it is not positive definite then. Several threads may ask, each with a core model of its own.
 
     where: the state in words, for that error.
     """
 
-    def __init__(self, model: _core.Model, state: np.ndarray, load_parameters: np.ndarray, where: str):
-        self._model, self._where = model, where
+    def __init__(self, scene: Scene, state: np.ndarray, load_parameters: np.ndarray, where: str):
+        self._scene, self._where = scene, where
+        self._factorizing = threading.Lock()
         self.state: np.ndarray = state
         self.load_parameters: np.ndarray = load_parameters
         self._whole: _Factorized | None = None
+
+    @property
+    def _model(self) -> _core.Model:
+        """The model of the core that this thread uses."""
+        return self._scene._model
 
     @property
     def _triangle(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
@@ -93,14 +105,18 @@ class Stiffness:
 
     def factorize(self) -> None:
         """Factorize the whole of K, not only the part that is coupled with a load."""
-        if self._whole is None:
-            triangle, low_rank = self._assembled
-            self._whole = _Factorized(*triangle, self._model.free_points, self._where, low_rank)
+        self._factor()
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """Solve K u = forces for u, (n,)."""
-        self.factorize()
-        return self._whole.solve(forces)
+        return self._factor().solve(forces)
+
+    def _factor(self) -> _Factorized:
+        with self._factorizing:
+            if self._whole is None:
+                triangle, low_rank = self._assembled
+                self._whole = _Factorized(*triangle, self._model.free_points, self._where, low_rank)
+            return self._whole
 
     def answer(self, forces: np.ndarray, moved: np.ndarray) -> np.ndarray:
         """Solve K du = forces - K moved for du of all degrees of freedom; `moved`: the prescribed ones, else zero."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._runtime.frozen import immutable
-from ...model.results.batch_result import BatchResult
+from ...model.results.batch_result import BatchOfPositions
 from .equilibria import EquilibriumSet
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @immutable
 @dataclass(frozen=True, repr=False)
-class EquilibriumBatch(BatchResult):
+class EquilibriumBatch(BatchOfPositions):
     """The equilibria of the k members of a batch, of ms.equilibrium(..., batch=k).
 
     positions: (k, n_v, 3) m; edge_rotations: (k, n_e) rad; tensors where an input was one. Rows of members that failed are

@@ -12,12 +12,13 @@ from ..._runtime.progress import solve_progress
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...model.scene.scene import Scene
+from ..adjoint.mapped import is_mapped
 from ..options import MixedNewton, Newton
-from .batch import find_batch
+from .batch import find_along, find_batch, from_starts
 from .cases import find_all, split, starts_of
 from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
-from .mapped import find_mapped, is_mapped
+from .mapped import find_mapped
 from .single_solve import Search, find
 
 if TYPE_CHECKING:
@@ -161,7 +162,13 @@ def equilibrium(
         if is_mapped(arguments):
             if batch is not None:
                 raise ValueError("batch and torch.func.vmap are both axes of members: take one of them")
-            return find_mapped(scene, arguments, start, search)
+            return find_mapped(
+                scene,
+                arguments,
+                lambda axis: find_along(
+                    axis, scene, None, from_starts(scene, start, search, axis.members), search
+                ),
+            )
         if batch is not None:
             return find_batch(scene, arguments, batch, threads, start, search)
         if threads is not None:

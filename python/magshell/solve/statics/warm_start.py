@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ... import _core
-from ..._input.tensors import require_torch
+from ..._input.arrays import count
 from ..._runtime.frozen import Frozen, remember
 from ..._runtime.keywords import LOAD_PARAMETERS, as_keywords
+from ..._runtime.worker_threads import checked_threads
 from ...errors import EquilibriumJumped, Interrupted, NotConverged
-from ...model.scene.fine_faces import fine_faces, having_fine_faces
-from ...model.scene.reshaped import REST, reshaped
-from ...model.scene.reshaped_states import directions_of, renumbered_vector
+from ...model.scene.batch_axis import BatchAxis
 from ...model.scene.scene import Scene
+from ..adjoint.batch import BatchAdjoint
+from ..adjoint.mapped import is_mapped
 from ..options import MixedNewton, Newton
+from .batch import find_along, starts_of_members
 from .cases import join, of_case, split, starts_of
-from .designs import between, numbers_only, packed, unpacked
+from .continued import Continued, Reached
 from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
-from .single_solve import Search, Solution, find, inputs_of
-from .start import Origin, state_in
+from .equilibrium_batch import EquilibriumBatch
+from .mapped import MappedEquilibrium, find_mapped
+from .single_solve import Search, Solution
 
 if TYPE_CHECKING:
     from ..._input.kinds import Starting
-
-_LARGEST_SECOND_ORDER = 0.5  # of the first-order change: a step that ends farther from it is taken in halves
-_NO_JUMP = 1e-3  # of the mesh's size: so little is no jump
-_SHORTEST_STEP = 1.0 / 32.0  # of the way to a new design
 
 
 class WarmStart(Frozen):
@@ -46,6 +42,9 @@ class WarmStart(Frozen):
     the next call starts from the last design again. Within `with warm.accept_jumps():` the new equilibrium is accepted.
 
     solver: MixedNewton() by default. `equilibria`: of the last design, or None. `solves`: the number of solves so far.
+    batch, threads: as in ms.equilibrium; a call returns an EquilibriumBatch. Each member goes on from its own last design,
+        with the bits of a WarmStart of its own. One that fails or jumps is in `failed` and stays at its last design; the
+        others go on. `start` may hold one start for each member. torch.func.vmap over k members needs batch=k.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -58,42 +57,75 @@ class WarmStart(Frozen):
     ((2, 33, 3), 1)
     """
 
-    def __init__(self, scene: Scene, *, start: Starting | None = None, solver: Newton | None = None):
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        start: Starting | EquilibriumBatch | None = None,
+        solver: Newton | None = None,
+        batch: int | None = None,
+        threads: int | None = None,
+    ):
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene, got {type(scene).__name__}")
         self.scene = scene
-        self.solves: int = 0
         self._search = Search(MixedNewton() if solver is None else solver)
         self._accepting, self._of_cases = False, False
         self._start = start
-        self._last: list[Solution] = []
-        self._design: list[dict[Any, Any]] = []
+        self._cases: tuple[Continued, ...] = ()
+        self._members: tuple[Equilibrium | None, ...] = ()  # of a batch
+        self._batch, self._threads = None if batch is None else count("batch", batch), threads
+        if self._batch is None:
+            if threads is not None:
+                raise ValueError(
+                    "threads is the number of threads of a batch: give batch=k, or ms.set_num_threads"
+                )
+            return
+        checked_threads(threads, self._batch)
+        self._cases = tuple(
+            Continued(scene, each, self._search) for each in starts_of_members(start, self._batch)
+        )
+        self._members = (None,) * self._batch
+
+    @property
+    def solves(self) -> int:
+        """The number of solves so far."""
+        return sum(each.solves for each in self._cases)
 
     @property
     def equilibria(self) -> Equilibrium | EquilibriumSet | None:
-        """The equilibrium, or equilibria, of the last design."""
-        return join([each.equilibrium for each in self._last], self._of_cases) if self._last else None
+        """The equilibrium, or equilibria, of the last design; of a batch those of all members, once each has one."""
+        if self._batch is not None:
+            found = [each for each in self._members if each is not None]
+            return EquilibriumSet(found) if len(found) == self._batch else None
+        last = [each.last for each in self._cases]
+        if None in last or not last:
+            return None
+        return join([each.solution.equilibrium for each in last if each is not None], self._of_cases)
 
     def __call__(self, **design: Any) -> Equilibrium | Any:
         """Find the equilibrium, or the equilibria, of a design, given by the arguments of ms.equilibrium."""
         design = as_keywords(self.scene, design, LOAD_PARAMETERS)
+        if self._batch is not None:
+            return self._of_members(design, self._batch)
         cases = split(design)
-        self._check(cases)
-        starts = starts_of(self._start, len(cases or [design]))
-        solutions = []
+        self._prepare(cases)
+        found: list[Reached] = []
         for k, arguments in enumerate(cases or [design]):
             try:
-                solution = self._next(k, arguments) if self._last else self._first(starts[k], arguments)
-                solutions.append(solution)
+                found.append(self._cases[k].found(arguments, self._accepting))
             except (EquilibriumJumped, NotConverged, Interrupted) as error:
                 if cases is None:
                     raise
-                last_good = error.last_good
+                last_good = self.equilibria
                 if not isinstance(error, EquilibriumJumped):
-                    last_good = EquilibriumSet([*(each.equilibrium for each in solutions), last_good])
+                    last_good = EquilibriumSet(
+                        [*(each.solution.equilibrium for each in found), error.last_good]
+                    )
                 raise of_case(error, k, len(cases), last_good) from error
-        designs = [numbers_only(arguments) for arguments in cases or [design]]
-        remember(self, _last=solutions, _of_cases=cases is not None, _design=designs)
+        for case, reached in zip(self._cases, found, strict=True):
+            case.store(reached)
+        remember(self, _of_cases=cases is not None)
         return self.equilibria
 
     @contextmanager
@@ -107,109 +139,76 @@ class WarmStart(Frozen):
             remember(self, _accepting=before)
 
     def state_dict(self) -> dict[Any, Any]:
-        """Return what a later WarmStart of an equal scene needs to continue with the same bits: tensors and plain values."""
-        torch = require_torch("a state_dict")
-        states = [
-            {
-                "state": torch.tensor(s.found.state),
-                "angle_branches": s.found.turns,
-                "fine_faces": torch.from_numpy(fine_faces(s.inputs.values)),
-            }
-            for s in self._last
-        ]
-        designs = [packed(self.scene, arguments, torch.from_numpy) for arguments in self._design]
-        return {"states": states, "designs": designs, "of_cases": self._of_cases}
+        """Return what a later WarmStart of an equal scene needs to continue with the same bits: tensors and plain values.
+
+        Raises ValueError if a member of a batch has no equilibrium yet.
+        """
+        if self._batch is None and self.equilibria is None:
+            return {"states": [], "designs": [], "of_cases": self._of_cases}
+        states, designs = zip(*(each.state() for each in self._cases), strict=True)
+        return {"states": list(states), "designs": list(designs), "of_cases": self._of_cases}
 
     def load_state_dict(self, state: dict[Any, Any]) -> None:
         """Continue from the state of another WarmStart."""
-        designs = [unpacked(self.scene, arguments) for arguments in state["designs"]]
-        last = []
-        for arguments, stored in zip(designs, state["states"], strict=True):
-            scene, values = reshaped(self.scene, arguments.get("values"))
-            inputs = inputs_of(scene, {**arguments, "values": values})
-            inputs = having_fine_faces(inputs, stored["fine_faces"].numpy())
-            origin = Origin(stored["state"].numpy(), stored["angle_branches"], inputs)
-            last.append(find(self.scene, arguments, origin, self._search, store_factor=True))
-        remember(self, _last=last, _design=designs, _of_cases=state["of_cases"])
-
-    def _first(self, start, arguments: dict[Any, Any]) -> Solution:
-        remember(self, solves=self.solves + 1)
-        return find(self.scene, arguments, start, self._search, store_factor=True)
-
-    def _next(self, k: int, arguments: dict[Any, Any]) -> Solution:
-        """Find case k of the new design, in as few steps as possible without straying from the first-order change."""
-        if self._accepting:
-            return self._step(self._last[k], arguments)
-        old, solution = self._design[k], self._last[k]
-        new = numbers_only(arguments)
-        at, step = 0.0, 1.0
-        while at < 1.0:
-            to = min(1.0, at + step)
-            trial = self._try(solution, arguments if to == 1.0 else between(old, new, to))
-            if trial is not None:
-                solution, at, step = trial, to, 2.0 * step
-            elif step > _SHORTEST_STEP:
-                step = max(0.5 * (to - at), _SHORTEST_STEP)
-            else:
-                raise EquilibriumJumped(
-                    f"the equilibrium jumps at {at:.3g} to {to:.3g} of the way from the last design to this one: "
-                    "it buckles or snaps. Take a shorter step, or go through it with accept_jumps().",
-                    self.equilibria,
-                )
-        return solution
-
-    def _try(self, last: Solution, arguments: dict[Any, Any]) -> Solution | None:
-        """Find the next equilibrium; return None if it does not continue the last one."""
-        try:
-            there = self._step(last, arguments)
-        except NotConverged:
-            return None
-        if there.equilibrium.saddles_escaped or there.equilibrium.relaxation_steps:
-            return None
-        return there if self._continues(last, there) else None
-
-    def _step(self, last: Solution, arguments: dict[Any, Any]) -> Solution:
-        remember(self, solves=self.solves + 1)
-        return find(self.scene, arguments, last.equilibrium, self._search, store_factor=True)
-
-    def _continues(self, last: Solution, there: Solution) -> bool:
-        model, before = there.inputs.scene._model, last.inputs.scene._model
-        if model is before:
-            with there.inputs.in_core():
-                expected = _core.first_order_change(model, last.found, there.inputs.load_parameters)
-            expected = model.positions(expected)
-        else:
-            expected = _first_order_change(last, there)
-        moved = model.positions(there.found.state) - before.positions(last.found.state)
-        strayed, size = _largest(moved - expected), _largest(expected)
-        return strayed <= max(_LARGEST_SECOND_ORDER * size, _NO_JUMP * self.scene._bodies.extent)
-
-    def _check(self, cases: list[dict[Any, Any]] | None) -> None:
-        count = 1 if cases is None else len(cases)
-        if self._last and (count != len(self._last) or (cases is not None) != self._of_cases):
-            raise ValueError(
-                f"this WarmStart holds {len(self._last)} load cases, and is asked for {count}: make another one for those"
+        number = len(state["states"])
+        if self._batch is not None and number != self._batch:
+            raise ValueError(f"this WarmStart has batch={self._batch}, and the state has {number} members")
+        cases = self._cases
+        if self._batch is None:
+            cases = tuple(Continued(self.scene, None, self._search) for _ in range(number))
+            if cases:
+                cases[0].solves = self.solves
+        for case, own, design in zip(cases, state["states"], state["designs"], strict=True):
+            case.restore(own, design)
+        remember(self, _cases=cases, _of_cases=state["of_cases"])
+        if self._batch is not None:
+            last = (each.last for each in cases)
+            remember(
+                self, _members=tuple(None if each is None else each.solution.equilibrium for each in last)
             )
 
+    def _prepare(self, cases: list[dict[Any, Any]] | None) -> None:
+        """Make what finds each load case. Raises ValueError if there were others before."""
+        number = 1 if cases is None else len(cases)
+        if self.equilibria is None:
+            starts = starts_of(self._start, number)
+            made = tuple(Continued(self.scene, each, self._search) for each in starts)
+            made[0].solves = self.solves
+            remember(self, _cases=made)
+        elif number != len(self._cases) or (cases is not None) != self._of_cases:
+            raise ValueError(
+                f"this WarmStart holds {len(self._cases)} load cases, and is asked for {number}: make another one for those"
+            )
 
-def _first_order_change(last: Solution, there: Solution) -> np.ndarray:
-    """Return the change of positions to first order, from an equilibrium to one with other rest positions, (n_v, 3) m.
+    def _of_members(self, design: dict[str, Any], members: int) -> EquilibriumBatch | MappedEquilibrium:
+        """Find the equilibria of all members of a batch."""
 
-    Both scenes have their own numbering of unknowns, so that forces and motions go from one to the other by vertices and
-    edges.
-    """
-    theirs, ours = last.inputs.scene, there.inputs.scene
-    if (held := directions_of(ours)) != directions_of(theirs):
-        raise ValueError(f"{REST} must be given in every call of a WarmStart, or in none")
-    state, model = state_in(ours, last.equilibrium), ours._model
-    with there.inputs.in_core():
-        forces = renumbered_vector(theirs, ours, model.gradient(state, there.inputs.load_parameters))
-        increment = model.driven_increment(state, there.inputs.load_parameters)
-    moved = renumbered_vector(theirs, ours, increment)
-    moved[held] = increment[held]
-    with last.inputs.in_core():
-        return theirs._model.positions(_core.push_forward(theirs._model, last.found, forces, moved))
+        def found(
+            member: int, arguments: dict[str, Any], progress: Callable[[float, float], None]
+        ) -> Solution:
+            reached = self._cases[member].found(arguments, self._accepting, progress)
+            self._cases[member].store(reached)
+            return reached.solution
 
+        def along(axis: BatchAxis) -> tuple[EquilibriumBatch, BatchAdjoint]:
+            if axis.members != members:
+                raise ValueError(
+                    f"this WarmStart has batch={members}, and torch.vmap has {axis.members} members"
+                )
+            try:
+                batch, adjoint = find_along(axis, self.scene, self._threads, found)
+            except Interrupted as error:
+                self._store(error.last_good)
+                raise
+            self._store(batch)
+            return batch, adjoint
 
-def _largest(displacements: np.ndarray) -> float:
-    return float(np.sqrt((displacements**2).sum(axis=1).max()))
+        if is_mapped(design):
+            return find_mapped(self.scene, design, along)
+        return along(BatchAxis(self.scene, design, members))[0]
+
+    def _store(self, batch: EquilibriumBatch | None) -> None:
+        """Store the equilibria of the members that were found."""
+        if batch is not None:
+            pairs = zip(self._members, batch._members, strict=True)
+            remember(self, _members=tuple(old if new is None else new for old, new in pairs))

@@ -1,0 +1,160 @@
+"""Equilibria of one design after another, each found from the one before, with a check for jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ..._input.tensors import require_torch
+from ...errors import EquilibriumJumped, NotConverged
+from ...model.scene.fine_faces import fine_faces, having_fine_faces
+from ...model.scene.reshaped import REST, reshaped
+from ...model.scene.reshaped_states import directions_of, renumbered_vector
+from .designs import between, numbers_only, packed, unpacked
+from .single_solve import Search, Solution, find, inputs_of
+from .start import Origin, state_in
+
+if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
+
+_LARGEST_SECOND_ORDER = 0.5  # of the first-order change: a step that ends farther from it is taken in halves
+_NO_JUMP = 1e-3  # of the mesh's size: so little is no jump
+_SHORTEST_STEP = 1.0 / 32.0  # of the way to a new design
+
+
+class Reached(NamedTuple):
+    """An equilibrium that was found, and the numbers of its design."""
+
+    solution: Solution
+    design: dict[Any, Any]
+
+
+class Continued:
+    """Finds the equilibrium of a design from that of the design before, for one load case or one member of a batch.
+
+    last: what was kept last, None at first. solves: the number of solves so far.
+    """
+
+    def __init__(self, scene: Scene, start: Any, search: Search):
+        self._scene, self._start, self._search = scene, start, search
+        self.last: Reached | None = None
+        self.solves: int = 0
+
+    def found(
+        self,
+        arguments: dict[Any, Any],
+        accept_jumps: bool,
+        progress: Callable[[float, float], None] | None = None,
+    ) -> Reached:
+        """Find the equilibrium of a design, without keeping it. Raises EquilibriumJumped and what a solve raises."""
+        search = replace(self._search, progress=progress)
+        if self.last is None:
+            solution = self._solved(arguments, self._start, search)
+        elif accept_jumps:
+            solution = self._solved(arguments, self.last.solution.equilibrium, search)
+        else:
+            solution = self._in_steps(self.last, arguments, search)
+        return Reached(solution, numbers_only(arguments))
+
+    def store(self, reached: Reached) -> None:
+        """Go on from this equilibrium in later calls."""
+        self.last = reached
+
+    def state(self) -> tuple[dict[str, Any], dict[Any, Any]]:
+        """Return what `restore` needs, the state and the design, as tensors and plain values."""
+        torch = require_torch("a state_dict")
+        solution, design = self._stored
+        state = {
+            "state": torch.tensor(solution.found.state),
+            "angle_branches": solution.found.turns,
+            "fine_faces": torch.from_numpy(fine_faces(solution.inputs.values)),
+        }
+        return state, packed(self._scene, design, torch.from_numpy)
+
+    def restore(self, state: dict[str, Any], design: dict[Any, Any]) -> None:
+        """Go on from the state of another object, with the same bits."""
+        arguments = unpacked(self._scene, design)
+        scene, values = reshaped(self._scene, arguments.get("values"))
+        inputs = inputs_of(scene, {**arguments, "values": values})
+        inputs = having_fine_faces(inputs, state["fine_faces"].numpy())
+        origin = Origin(state["state"].numpy(), state["angle_branches"], inputs)
+        solution = find(self._scene, arguments, origin, self._search, store_factor=True)
+        self.last = Reached(solution, arguments)
+
+    @property
+    def _stored(self) -> Reached:
+        if self.last is None:
+            raise ValueError("this WarmStart has no equilibrium yet")
+        return self.last
+
+    def _solved(self, arguments: dict[Any, Any], start: Any, search: Search) -> Solution:
+        self.solves += 1
+        return find(self._scene, arguments, start, search, store_factor=True)
+
+    def _in_steps(self, last: Reached, arguments: dict[Any, Any], search: Search) -> Solution:
+        """Find the equilibrium of a new design, in as few steps as possible that stay near the first-order change."""
+        solution, new = last.solution, numbers_only(arguments)
+        at, step = 0.0, 1.0
+        while at < 1.0:
+            to = min(1.0, at + step)
+            trial = self._tried(solution, arguments if to == 1.0 else between(last.design, new, to), search)
+            if trial is not None:
+                solution, at, step = trial, to, 2.0 * step
+            elif step > _SHORTEST_STEP:
+                step = max(0.5 * (to - at), _SHORTEST_STEP)
+            else:
+                raise EquilibriumJumped(
+                    f"the equilibrium jumps at {at:.3g} to {to:.3g} of the way from the last design to this one: "
+                    "it buckles or snaps. Take a shorter step, or go through it with accept_jumps().",
+                    last.solution.equilibrium,
+                )
+        return solution
+
+    def _tried(self, last: Solution, arguments: dict[Any, Any], search: Search) -> Solution | None:
+        """Find the next equilibrium; return None if it does not continue the last one."""
+        try:
+            there = self._solved(arguments, last.equilibrium, search)
+        except NotConverged:
+            return None
+        if there.equilibrium.saddles_escaped or there.equilibrium.relaxation_steps:
+            return None
+        return there if self._continues(last, there) else None
+
+    def _continues(self, last: Solution, there: Solution) -> bool:
+        model, before = there.inputs.scene._model, last.inputs.scene._model
+        if model is before:
+            with there.inputs.in_core():
+                expected = _core.first_order_change(model, last.found, there.inputs.load_parameters)
+            expected = model.positions(expected)
+        else:
+            expected = _first_order_change(last, there)
+        moved = model.positions(there.found.state) - before.positions(last.found.state)
+        strayed, size = _largest(moved - expected), _largest(expected)
+        return strayed <= max(_LARGEST_SECOND_ORDER * size, _NO_JUMP * self._scene._bodies.extent)
+
+
+def _first_order_change(last: Solution, there: Solution) -> np.ndarray:
+    """Return the change of positions to first order, from an equilibrium to one with other rest positions, (n_v, 3) m.
+
+    Both scenes have their own numbering of unknowns, so that forces and motions go from one to the other by vertices and
+    edges.
+    """
+    theirs, ours = last.inputs.scene, there.inputs.scene
+    if (held := directions_of(ours)) != directions_of(theirs):
+        raise ValueError(f"{REST} must be given in every call of a WarmStart, or in none")
+    state, model = state_in(ours, last.equilibrium), ours._model
+    with there.inputs.in_core():
+        forces = renumbered_vector(theirs, ours, model.gradient(state, there.inputs.load_parameters))
+        increment = model.driven_increment(state, there.inputs.load_parameters)
+    moved = renumbered_vector(theirs, ours, increment)
+    moved[held] = increment[held]
+    with last.inputs.in_core():
+        return theirs._model.positions(_core.push_forward(theirs._model, last.found, forces, moved))
+
+
+def _largest(displacements: np.ndarray) -> float:
+    return float(np.sqrt((displacements**2).sum(axis=1).max()))
