@@ -155,6 +155,20 @@ def test_field_along_the_horizontal_axis_is_what_changes_of_it(name, results):
     np.testing.assert_allclose(axes.lines[0].get_xdata()[[0, -1]], ends, rtol=1e-12)
 
 
+def test_plot_history_of_one_equilibrium_names_the_table(results):
+    with pytest.raises(
+        ValueError, match=r"several states.*ms\.to_pandas\(result, probes=\.\.\.\) has the numbers"
+    ):
+        results["rest"].plot_history("tip.z", probes=PROBES[0])
+
+
+def test_name_of_a_group_as_a_selection_is_told_how_to_be_given():
+    with pytest.raises(ValueError, match=r"of must be .*mesh\.vertices_in\('LOADED'\)"):
+        ms.Probe("tip", "LOADED")
+    with pytest.raises(ValueError, match=r"a group of the mesh is mesh\.edges_in\('FIXED'\)"):
+        ms.Clamp("FIXED")
+
+
 def cases_in(fields, **more) -> ms.EquilibriumSet:
     solved = [ms.equilibrium(SCENE, **GIVEN, applied_flux_density=each, **more) for each in fields]
     return ms.EquilibriumSet(solved)

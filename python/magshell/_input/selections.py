@@ -60,7 +60,13 @@ def selection(name: str, values: Any, of: str | None = None) -> np.ndarray:
 
     of: what they count, by default what the last word of their name says.
     """
-    _check_kind(name, values, of or name.split()[-1])
+    wanted = of or name.split()[-1]
+    _check_kind(name, values, wanted)
+    if isinstance(values, str) and wanted in KINDS:
+        raise ValueError(
+            f"{name} must be integer indices of shape (k,), got {values!r:.60}; a group of the mesh is "
+            f"mesh.{wanted}_in({values!r:.60})"
+        )
     array = np.atleast_1d(array_of(name, values, "be integer indices of shape (k,)"))
     if array.size == 0:
         raise ValueError(f"{name} are empty: there is nothing to apply this to")

@@ -36,7 +36,7 @@ class PlotMixin(Frozen):
 
 
 class SaveMixin(PlotMixin):
-    """A mixin for results that ms.save can write."""
+    """A mixin for results, which ms.save can write and ms.plot_history can draw."""
 
     _how_to_change = (
         "It is what a solve found; to go on from other positions, start the next solve from a changed copy: "
@@ -47,16 +47,12 @@ class SaveMixin(PlotMixin):
         """Write the result into one .npz file: ms.save(path, self). ms.load(path, scene) reads it."""
         _FUNCTIONS["save"](path, self)
 
-
-class HistoryMixin(SaveMixin):
-    """A mixin for results with several states."""
-
     def plot_history(self, columns: Any, **options: Any) -> Any:
-        """Draw columns of the table of this result as curves: ms.plot_history(self, columns, ...), with its keywords."""
+        """Draw columns of the result's table as curves: ms.plot_history(self, columns, ...), with its keywords."""
         return _FUNCTIONS["plot_history"](self, columns, **options)
 
 
-class AnimateMixin(HistoryMixin):
+class AnimateMixin(SaveMixin):
     """A mixin for results with a sequence of states."""
 
     def animate(self, path: Any, **options: Any) -> Any:

@@ -39,7 +39,7 @@ def plot_history(
         which are columns as well: "time", "parameter", "case". "field" is what changes of the applied field: the component
         along its line, its magnitude, or the factor on fields that vary in space.
 
-    Motions, paths and sets of equilibria have it as a method, result.plot_history(...).
+    Results have it as a method, result.plot_history(...).
 
     Raises ValueError if there is no such column, if the result has one state only, or if the field is the same in all
     states.
@@ -58,7 +58,10 @@ def plot_history(
         result, probes=probes
     ).reset_index()  # the time, the parameter or the case becomes a column
     if len(table) < 2:
-        raise ValueError("result must have several states: a motion, a path or load cases")
+        raise ValueError(
+            "result must have several states: a motion, a path or load cases; "
+            "ms.to_pandas(result, probes=...) has the numbers of one"
+        )
     wanted = [columns] if isinstance(columns, str) else columns
     if not isinstance(wanted, list | tuple) or not wanted:
         raise ValueError(f"columns must be the name of a column or a list of names, got {columns!r:.60}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._input.checked_list import listed
 from ..._input.tensors import stacked
-from ..._runtime.mixins import HistoryMixin
+from ..._runtime.mixins import SaveMixin
 from ...model.bodies.bodies import BODIES
 from ...model.results.result_lookup import OfOneBody, result_of
 from .equilibrium import Equilibrium
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...model.scene.scene import Scene
 
 
-class EquilibriumSet(HistoryMixin, OfOneBody, Sequence[Equilibrium]):
+class EquilibriumSet(SaveMixin, OfOneBody, Sequence[Equilibrium]):
     """The equilibria of a scene in k load cases, or k equilibria of one; a sequence of Equilibrium.
 
     positions, displacements: (k, n_v, 3) m; edge_rotations: (k, n_e) rad. Tensors where those of the cases are.
