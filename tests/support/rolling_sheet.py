@@ -2,7 +2,7 @@
 
 `PYTHONPATH=. python tests/support/rolling_sheet.py [MS ...]` prints counts and travel for steps of these lengths, and
 `... rolling_sheet.py adaptive` for steps that are chosen by tolerances; `... rolling_sheet.py implicit [MS ...]` takes
-TR-BDF2 with implicit contact instead of implicit Euler.
+TR-BDF2 with implicit contact instead of implicit Euler; `... rolling_sheet.py turns` prints the ways in two turns.
 """
 
 import sys
@@ -13,6 +13,7 @@ import magshell as ms
 
 LENGTH, WIDTH, THICKNESS = 3.7e-3, 1.5e-3, 0.185e-3  # [m]
 DURATION = 0.32  # [s]
+TURN = 0.2  # [s] of the field
 
 
 def flux_density(t: float) -> np.ndarray:
@@ -61,8 +62,28 @@ def travel(move: ms.Trajectory) -> float:
     return 1e3 * float((move.positions[-1] - move.positions[0])[:, 0].mean())
 
 
+def half_travels(move: ms.Trajectory) -> tuple[float, float]:
+    """Return the mean displacement along x in each half of a motion of two turns [mm]."""
+    center = 1e3 * move.positions[:, :, 0].mean(axis=1)
+    half = len(center) // 2
+    return center[half] - center[0], center[-1] - center[half]
+
+
+def print_half_travels() -> None:
+    """Print the ways in two turns by two integrators and steps of several lengths, and in fields of other strength."""
+    integrators = (ms.ImplicitEuler(), ms.TRBDF2(implicit_contact=True))
+    cases = [(integrator, step, 1.0) for integrator in integrators for step in (8.0, 4.0, 2.0, 1.0)]
+    for integrator, step, factor in [*cases, (integrators[0], 1.0, 0.99), (integrators[0], 1.0, 1.01)]:
+        move = rolling_sheet(1e-3 * step, factor, 2 * TURN, integrator)
+        first, second = half_travels(move)
+        print(f"{integrator!r}, {step:g} ms, field times {factor}: {first:.3f}, {second:.3f} mm", flush=True)
+
+
 def main() -> None:
     """Print counts and travel for steps of the given lengths [ms]."""
+    if sys.argv[1:] == ["turns"]:
+        print_half_travels()
+        return
     if sys.argv[1:] == ["adaptive"]:
         for tolerance in (1e-4, 3e-5, 1e-5, None):
             move = rolling_sheet(ms.Adaptive(8e-3, tolerance))

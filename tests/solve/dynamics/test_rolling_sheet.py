@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
-from tests.support.rolling_sheet import rolling_sheet, travel
+from tests.support.rolling_sheet import TURN, half_travels, rolling_sheet, travel
 
 # The bounds of issue 32. Measured: 704, 845, 1040 and 1458; before the descent went downhill 2580, 2193, 1922 and 1695.
 MOST_FACTORIZATIONS = {8e-3: 1000, 4e-3: 1000, 2e-3: 1200, 1e-3: 1600}
@@ -14,6 +14,7 @@ MOST_FACTORIZATIONS = {8e-3: 1000, 4e-3: 1000, 2e-3: 1200, 1e-3: 1600}
 def test_a_rolling_sheet_takes_whole_steps(time_step):
     move = rolling_sheet(time_step)
     assert move.factorizations <= MOST_FACTORIZATIONS[time_step]
+    assert move._step_factorizations.max() < 250  # measured: at most 52
     assert not move.substeps
 
 
@@ -37,8 +38,18 @@ def test_error_of_a_rolling_sheet_falls_with_the_tolerance_of_its_steps():
     assert moves[2].factorizations <= 1800 and not moves[2].substeps
 
 
-@pytest.mark.parametrize("time_step", [4e-3, 1e-3])
-def test_the_way_of_a_rolling_sheet_per_turn_hardly_depends_on_the_step(time_step):
+def travel_afterwards(time_step, integrator=None):
+    """Return the distance [mm]. The first turn holds the jump of the sheet, whose landing depends on everything."""
+    return -half_travels(rolling_sheet(time_step, duration=2 * TURN, integrator=integrator))[1]
+
+
+def test_the_way_of_a_rolling_sheet_per_turn_hardly_depends_on_the_step():
     """Compare with docs/how-to/paper-robot.md: 5.2 mm in the second turn. Measured: 5.30 mm; 5.19 to 5.23 on its meshes."""
-    center = rolling_sheet(time_step, duration=0.4).positions[:, :, 0].mean(axis=1)
-    assert 1e3 * (center[len(center) // 2] - center[-1]) == pytest.approx(5.25, rel=0.03)
+    assert travel_afterwards(4e-3) == pytest.approx(5.25, rel=0.03)
+
+
+def test_travel_of_a_rolling_sheet_per_turn_is_the_same_by_two_integrators():
+    """Compare within 2 %, the goal of issue 32. Measured: 5.305 by implicit Euler, 5.234 by implicit contact."""
+    travels = [travel_afterwards(1e-3, each) for each in (None, ms.TRBDF2(implicit_contact=True))]
+    assert travels[0] == pytest.approx(5.25, rel=0.03)
+    assert travels[1] == pytest.approx(travels[0], rel=0.02)
