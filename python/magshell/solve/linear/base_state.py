@@ -74,22 +74,22 @@ def inputs_about(
     return inputs.with_values(equilibrium._values)
 
 
-def asked_inputs(scene: Scene, equilibrium: Equilibrium | None, arguments: dict[str, Any]) -> Inputs:
-    """Return the inputs of a linear solve, at rest or about an equilibrium, from its keywords in the table.
+def linear_inputs(scene: Scene, equilibrium: Equilibrium | None, arguments: dict[str, Any]) -> Inputs:
+    """Return the inputs of a linear solve, at rest or about an equilibrium, from its keywords.
 
-    Raises ValueError for what does not fit.
+    Raises ValueError if they do not fit the scene or the equilibrium.
     """
     if equilibrium is None:
         inputs = plain_inputs(scene, differentiable=True, **arguments)
         _refuse_own_field(scene)
         return inputs
     inputs = inputs_about(scene, equilibrium, differentiable=True, **arguments)
-    refuse_what_cannot_be(equilibrium, inputs)
+    check_change(equilibrium, inputs)
     return inputs
 
 
 def leaves_of(inputs: Inputs, equilibrium: Equilibrium | None) -> list[tuple[Leaf, int]]:
-    """Return the leaves of a linear solve, each with the load parameters that it may be one of, BEFORE or AFTER."""
+    """Return the leaves of a linear solve, each with the load parameters to which it may belong, BEFORE or AFTER."""
     own = [] if equilibrium is None or equilibrium._inputs is None else equilibrium._inputs.leaves
     return [*((leaf, BEFORE) for leaf in own), *((leaf, AFTER) for leaf in inputs.leaves)]
 
@@ -107,7 +107,7 @@ def residual_of(inputs: Inputs, equilibrium: Equilibrium | None) -> Residual:
 def set_state(equilibrium: Equilibrium) -> None:
     """Set the full turns of angles in the core to those of an equilibrium, from which later evaluations continue.
 
-    The state itself has angles up to full turns only.
+    The state itself determines angles up to full turns only.
     """
     model = equilibrium.scene._model
     model.held_forces(equilibrium._state, equilibrium._angle_branches, equilibrium._load_parameters)
@@ -143,7 +143,7 @@ class StiffnessAbout(Stiffness):
         return self.answer(forces, moved)
 
 
-def refuse_what_cannot_be(equilibrium: Equilibrium, inputs: Inputs) -> None:
+def check_change(equilibrium: Equilibrium, inputs: Inputs) -> None:
     """Raise ValueError if no load parameter changes, or if the equilibrium is not stable."""
     if not equilibrium.stable:
         raise ValueError(

@@ -19,7 +19,7 @@ from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ..adjoint.buckling import BucklingAdjoint
 from ..statics.equilibrium import Equilibrium
-from .base_state import StiffnessAbout, asked_inputs, leaves_of, residual_of
+from .base_state import StiffnessAbout, leaves_of, linear_inputs, residual_of
 from .mode_shapes import mode_shapes
 from .rest import RestStiffness, pulling_parts, refuse_springs
 from .stiffness import Stiffness
@@ -126,7 +126,7 @@ def linear_buckling(
     """
     arguments = given_to("linear_buckling", locals())
     modes = count("modes", modes)
-    inputs = asked_inputs(scene, equilibrium, arguments)
+    inputs = linear_inputs(scene, equilibrium, arguments)
     refuse_springs(inputs)
     if scene._body_contacts:
         raise ValueError(

@@ -22,7 +22,7 @@ from ...model.scene.solve_inputs import Inputs
 from ..adjoint.batch import BatchAdjoint, Member, OnThreads, solve_members
 from ..adjoint.mapped import SolvedMap, map_solves
 from ..statics.equilibrium import Equilibrium
-from .base_state import StiffnessAbout, asked_inputs
+from .base_state import StiffnessAbout, linear_inputs
 from .single_response import LinearResponse, adjoint_of, positions_of_response, responded, result_of_response
 from .stiffness import IndefiniteStiffness
 
@@ -119,7 +119,7 @@ def _respond_along(
     every: dict[str, Any] = dict.fromkeys(each.name for each in keywords_of("linear_response"))
     first = {**every, **axis.arguments(0)[0]}  # checked here, as every member would raise the same
     there, first["values"] = reshaped(scene, first["values"], no_gradient_with=())
-    inputs = asked_inputs(there, equilibrium, first)
+    inputs = linear_inputs(there, equilibrium, first)
     about = None
     if equilibrium is not None:
         with inputs.in_core():

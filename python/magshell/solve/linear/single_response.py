@@ -17,7 +17,7 @@ from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Values
 from ..adjoint.response import ResponseAdjoint
 from ..statics.equilibrium import Equilibrium
-from .base_state import StiffnessAbout, asked_inputs, leaves_of, residual_of
+from .base_state import StiffnessAbout, leaves_of, linear_inputs, residual_of
 from .rest import RestStiffness, forces_at_rest
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def responded(
     """Compute the response with the arguments of ms.linear_response. about: the stiffness at the equilibrium, if known."""
     began = time.perf_counter()
     scene, values = reshaped(scene, arguments["values"], no_gradient_with=())
-    inputs = asked_inputs(scene, equilibrium, {**arguments, "values": values})
+    inputs = linear_inputs(scene, equilibrium, {**arguments, "values": values})
     at_rest = forces_at_rest(inputs) if equilibrium is None else None
     with inputs.in_core():
         if equilibrium is None:

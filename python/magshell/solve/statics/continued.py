@@ -1,4 +1,4 @@
-"""Equilibria of one design after another, each found from the one before, with a check for jumps."""
+"""Continuation of equilibria from one design to the next, with a check for jumps."""
 
 from __future__ import annotations
 
@@ -21,36 +21,38 @@ from .start import Origin, state_in
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene
 
-_LARGEST_SECOND_ORDER = 0.5  # of the first-order change: a step that ends farther from it is taken in halves
-_NO_JUMP = 1e-3  # of the mesh's size: so little is no jump
-_SHORTEST_STEP = 1.0 / 32.0  # of the way to a new design
+_MAX_DEVIATION = (
+    0.5  # [-] largest deviation from the first-order change, over that change; beyond it a step is halved
+)
+_NO_JUMP = 1e-3  # [-] deviation, over the extent of the bodies, that never counts as a jump
+_SHORTEST_STEP = 1.0 / 32.0  # [-] of the change of the design
 
 
-class Reached(NamedTuple):
+class ReachedEquilibrium(NamedTuple):
     """An equilibrium that was found, and the numbers of its design."""
 
     solution: Solution
     design: dict[Any, Any]
 
 
-class Continued:
-    """Finds the equilibrium of a design from that of the design before, for one load case or one member of a batch.
+class DesignContinuation:
+    """Finds the equilibrium of each design from that of the last one, for one load case or one member of a batch.
 
-    last: what was kept last, None at first. solves: the number of solves so far.
+    last: the equilibrium stored last, None at first. solves: the number of solves so far.
     """
 
     def __init__(self, scene: Scene, start: Any, search: Search):
         self._scene, self._start, self._search = scene, start, search
-        self.last: Reached | None = None
+        self.last: ReachedEquilibrium | None = None
         self.solves: int = 0
 
-    def found(
+    def find(
         self,
         arguments: dict[Any, Any],
         accept_jumps: bool,
         progress: Callable[[float, float], None] | None = None,
-    ) -> Reached:
-        """Find the equilibrium of a design, without keeping it. Raises EquilibriumJumped and what a solve raises."""
+    ) -> ReachedEquilibrium:
+        """Find the equilibrium of a design, without storing it. Raises EquilibriumJumped and the errors of a solve."""
         search = replace(self._search, progress=progress)
         if self.last is None:
             solution = self._solved(arguments, self._start, search)
@@ -58,14 +60,14 @@ class Continued:
             solution = self._solved(arguments, self.last.solution.equilibrium, search)
         else:
             solution = self._in_steps(self.last, arguments, search)
-        return Reached(solution, numbers_only(arguments))
+        return ReachedEquilibrium(solution, numbers_only(arguments))
 
-    def store(self, reached: Reached) -> None:
-        """Go on from this equilibrium in later calls."""
+    def store(self, reached: ReachedEquilibrium) -> None:
+        """Store this equilibrium, from which the next call starts."""
         self.last = reached
 
     def state(self) -> tuple[dict[str, Any], dict[Any, Any]]:
-        """Return what `restore` needs, the state and the design, as tensors and plain values."""
+        """Return the state and the design for `restore`, as tensors and plain values."""
         torch = require_torch("a state_dict")
         solution, design = self._stored
         state = {
@@ -76,17 +78,17 @@ class Continued:
         return state, packed(self._scene, design, torch.from_numpy)
 
     def restore(self, state: dict[str, Any], design: dict[Any, Any]) -> None:
-        """Go on from the state of another object, with the same bits."""
+        """Continue from the result of `state` of another object, with the same bits."""
         arguments = unpacked(self._scene, design)
         scene, values = reshaped(self._scene, arguments.get("values"))
         inputs = inputs_of(scene, {**arguments, "values": values})
         inputs = having_fine_faces(inputs, state["fine_faces"].numpy())
         origin = Origin(state["state"].numpy(), state["angle_branches"], inputs)
         solution = find(self._scene, arguments, origin, self._search, store_factor=True)
-        self.last = Reached(solution, arguments)
+        self.last = ReachedEquilibrium(solution, arguments)
 
     @property
-    def _stored(self) -> Reached:
+    def _stored(self) -> ReachedEquilibrium:
         if self.last is None:
             raise ValueError("this WarmStart has no equilibrium yet")
         return self.last
@@ -95,8 +97,10 @@ class Continued:
         self.solves += 1
         return find(self._scene, arguments, start, search, store_factor=True)
 
-    def _in_steps(self, last: Reached, arguments: dict[Any, Any], search: Search) -> Solution:
-        """Find the equilibrium of a new design, in as few steps as possible that stay near the first-order change."""
+    def _in_steps(self, last: ReachedEquilibrium, arguments: dict[Any, Any], search: Search) -> Solution:
+        """Find the equilibrium of a new design. Steps between designs are halved until each stays near its first-order
+        change.
+        """
         solution, new = last.solution, numbers_only(arguments)
         at, step = 0.0, 1.0
         while at < 1.0:
@@ -133,15 +137,14 @@ class Continued:
         else:
             expected = _first_order_change(last, there)
         moved = model.positions(there.found.state) - before.positions(last.found.state)
-        strayed, size = _largest(moved - expected), _largest(expected)
-        return strayed <= max(_LARGEST_SECOND_ORDER * size, _NO_JUMP * self._scene._bodies.extent)
+        deviation, size = _largest(moved - expected), _largest(expected)
+        return deviation <= max(_MAX_DEVIATION * size, _NO_JUMP * self._scene._bodies.extent)
 
 
 def _first_order_change(last: Solution, there: Solution) -> np.ndarray:
     """Return the change of positions to first order, from an equilibrium to one with other rest positions, (n_v, 3) m.
 
-    Both scenes have their own numbering of unknowns, so that forces and motions go from one to the other by vertices and
-    edges.
+    The two scenes number their unknowns differently, so forces and motions are transferred by vertices and edges.
     """
     theirs, ours = last.inputs.scene, there.inputs.scene
     if (held := directions_of(ours)) != directions_of(theirs):

@@ -18,7 +18,7 @@ from ..adjoint.mapped import is_mapped
 from ..options import MixedNewton, Newton
 from .batch import find_along, starts_of_members
 from .cases import join, of_case, split, starts_of
-from .continued import Continued, Reached
+from .continued import DesignContinuation, ReachedEquilibrium
 from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .equilibrium_batch import EquilibriumBatch
@@ -42,9 +42,9 @@ class WarmStart(Frozen):
     the next call starts from the last design again. Within `with warm.accept_jumps():` the new equilibrium is accepted.
 
     solver: MixedNewton() by default. `equilibria`: of the last design, or None. `solves`: the number of solves so far.
-    batch, threads: as in ms.equilibrium; a call returns an EquilibriumBatch. Each member goes on from its own last design,
-        with the bits of a WarmStart of its own. One that fails or jumps is in `failed` and stays at its last design; the
-        others go on. `start` may hold one start for each member. torch.func.vmap over k members needs batch=k.
+    batch, threads: as in ms.equilibrium; a call returns an EquilibriumBatch. Each member continues from its own last design,
+        with the same bits as a separate WarmStart. A member that fails or jumps is in `failed` and stays at its last design,
+        while the others continue. `start` may hold one start for each member. torch.func.vmap over k members needs batch=k.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -72,7 +72,7 @@ class WarmStart(Frozen):
         self._search = Search(MixedNewton() if solver is None else solver)
         self._accepting, self._of_cases = False, False
         self._start = start
-        self._cases: tuple[Continued, ...] = ()
+        self._cases: tuple[DesignContinuation, ...] = ()
         self._members: tuple[Equilibrium | None, ...] = ()  # of a batch
         self._batch, self._threads = None if batch is None else count("batch", batch), threads
         if self._batch is None:
@@ -83,7 +83,7 @@ class WarmStart(Frozen):
             return
         checked_threads(threads, self._batch)
         self._cases = tuple(
-            Continued(scene, each, self._search) for each in starts_of_members(start, self._batch)
+            DesignContinuation(scene, each, self._search) for each in starts_of_members(start, self._batch)
         )
         self._members = (None,) * self._batch
 
@@ -110,10 +110,10 @@ class WarmStart(Frozen):
             return self._of_members(design, self._batch)
         cases = split(design)
         self._prepare(cases)
-        found: list[Reached] = []
+        found: list[ReachedEquilibrium] = []
         for k, arguments in enumerate(cases or [design]):
             try:
-                found.append(self._cases[k].found(arguments, self._accepting))
+                found.append(self._cases[k].find(arguments, self._accepting))
             except (EquilibriumJumped, NotConverged, Interrupted) as error:
                 if cases is None:
                     raise
@@ -139,7 +139,7 @@ class WarmStart(Frozen):
             remember(self, _accepting=before)
 
     def state_dict(self) -> dict[Any, Any]:
-        """Return what a later WarmStart of an equal scene needs to continue with the same bits: tensors and plain values.
+        """Return the state from which a WarmStart of an equal scene continues with the same bits: tensors and plain values.
 
         Raises ValueError if a member of a batch has no equilibrium yet.
         """
@@ -155,7 +155,7 @@ class WarmStart(Frozen):
             raise ValueError(f"this WarmStart has batch={self._batch}, and the state has {number} members")
         cases = self._cases
         if self._batch is None:
-            cases = tuple(Continued(self.scene, None, self._search) for _ in range(number))
+            cases = tuple(DesignContinuation(self.scene, None, self._search) for _ in range(number))
             if cases:
                 cases[0].solves = self.solves
         for case, own, design in zip(cases, state["states"], state["designs"], strict=True):
@@ -168,11 +168,11 @@ class WarmStart(Frozen):
             )
 
     def _prepare(self, cases: list[dict[Any, Any]] | None) -> None:
-        """Make what finds each load case. Raises ValueError if there were others before."""
+        """Create the continuation of each load case. Raises ValueError if the number of load cases has changed."""
         number = 1 if cases is None else len(cases)
         if self.equilibria is None:
             starts = starts_of(self._start, number)
-            made = tuple(Continued(self.scene, each, self._search) for each in starts)
+            made = tuple(DesignContinuation(self.scene, each, self._search) for each in starts)
             made[0].solves = self.solves
             remember(self, _cases=made)
         elif number != len(self._cases) or (cases is not None) != self._of_cases:
@@ -186,7 +186,7 @@ class WarmStart(Frozen):
         def found(
             member: int, arguments: dict[str, Any], progress: Callable[[float, float], None]
         ) -> Solution:
-            reached = self._cases[member].found(arguments, self._accepting, progress)
+            reached = self._cases[member].find(arguments, self._accepting, progress)
             self._cases[member].store(reached)
             return reached.solution
 
