@@ -1,7 +1,7 @@
 #include "magshell/adjoint/static.h"
 
 #include "magshell/core/errors.h"
-#include "magshell/solve/newton/unsymmetric.h"
+#include "magshell/solve/linear_response.h"
 
 namespace magshell {
 
@@ -16,7 +16,7 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
 
     model.set_angle_branches(equilibrium.angle_branches);
     model.evaluate(q, load_parameters);
-    if (model.capabilities().has_unsymmetric_tangent || dof_map.has_values() || rest.asked)
+    if (needs_hessian(model, equilibrium) || dof_map.has_values() || rest.asked)
         model.assemble(q, load_parameters, false);
     const auto add_product = [&](const VectorXd& motion, VectorXd& forces) {
         VectorXd product(q.size());
@@ -33,7 +33,7 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     if (has_motor_gradient)
         dof_map.add_motor_force_change(model.residual().gradient, by_motor_forces, by_free);
     VectorXd reduced = -dof_map.vector(by_free);
-    solve_at_equilibrium(model, *equilibrium.factor, true, reduced);
+    solve_at_equilibrium(model, equilibrium, true, reduced);
     const VectorXd lambda = dof_map.expand(reduced);
     Gradient gradient(model.parameters().registry());
     model.parameters().vjp(q, load_parameters, lambda + motors, gradient);

@@ -1,5 +1,9 @@
 #include "magshell/solve/linear_response.h"
 
+#include <limits>
+#include <string>
+#include <utility>
+
 #include "magshell/core/errors.h"
 #include "magshell/linalg/loaded_part.h"
 #include "magshell/linalg/residual.h"
@@ -85,17 +89,30 @@ VectorXd stiffness_times(const VectorXd& motion, Model& model, const VectorXd& q
     return forces;
 }
 
+// Solves with the stored factorization: of the symmetric part of K, at the equilibrium or near it.
+void solve_with_stored_factor(const Model& model, const Factor& factor, bool transposed, double tolerance,
+                              VectorXd& reduced) {
+    if (!model.unsymmetric()) return factor.solve_approximately(reduced, tolerance);
+    const GmresReport report =
+        solve_unsymmetric(model, factor, transposed, {tolerance, to_round_off.max_iterations}, reduced);
+    if (!report.converged)
+        throw InvalidInput(
+            "a linear solve with a pressure without potential did not converge: its relative residual is " +
+            std::to_string(report.residual));
+}
+
 // Returns the change of all dofs that cancels a change of the gradient, to first order, while prescribed dofs change. The model was
-// evaluated last at the state of the equilibrium.
+// evaluated last at the state of the equilibrium. exact: with its Hessian, rather than with that of the stored factorization.
 VectorXd state_change(Model& model, const StaticsResult& equilibrium, const LoadParameters& load_parameters,
-                      ChangeAlong along) {
+                      ChangeAlong along, bool exact) {
     const VectorXd& q = equilibrium.state;
     const DofMap& dof_map = model.dof_map();
     VectorXd& gradient = along.gradient;
     VectorXd change = along.prescribed;
     if (along.moved.size() > 0) change += along.moved;
     const bool moves = !change.isZero(0.0);
-    if (moves || model.capabilities().has_unsymmetric_tangent) model.assemble(q, load_parameters, false);
+    if (moves || model.capabilities().has_unsymmetric_tangent || (exact && needs_hessian(model, equilibrium)))
+        model.assemble(q, load_parameters, false);
     if (moves) {
         VectorXd pull(q.size());
         model.multiply(change, pull);
@@ -105,12 +122,50 @@ VectorXd state_change(Model& model, const StaticsResult& equilibrium, const Load
     }
     VectorXd reduced = -dof_map.vector(gradient);
     if (along.forces.size() > 0) reduced -= along.forces;
-    solve_at_equilibrium(model, *equilibrium.factor, false, reduced);
+    if (exact)
+        solve_at_equilibrium(model, equilibrium, false, reduced);
+    else
+        solve_with_stored_factor(model, *equilibrium.factor, false, to_round_off.tolerance, reduced);
     change += dof_map.expand(reduced);
     return change;
 }
 
 }  // namespace
+
+bool needs_hessian(const Model& model, const StaticsResult& equilibrium) {
+    return !equilibrium.factor_is_exact || model.capabilities().has_unsymmetric_tangent;
+}
+
+void solve_at_equilibrium(const Model& model, const StaticsResult& equilibrium, bool transposed,
+                          VectorXd& reduced) {
+    // The factorization may be of a state 1e-7 of the thickness away, whose Hessian differs by up to 1e-4 in slender bodies. Each
+    // correction leaves that part of the error, until round-off.
+    constexpr int most_corrections = 10;  // see test_gradients_do_not_depend_on_where_the_search_began
+    // [-] Residual of the solve of a correction, and the last correction over the solution; see
+    // test_gradients_do_not_depend_on_where_the_search_began.
+    constexpr double of_correction = 1e-6, negligible = 1e-13;
+    const Factor& factor = *equilibrium.factor;
+    const VectorXd wanted = reduced;
+    solve_with_stored_factor(model, factor, transposed, to_round_off.tolerance, reduced);
+    if (equilibrium.factor_is_exact) return;
+    const DofMap& dof_map = model.dof_map();
+    double last = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < most_corrections; ++k) {
+        const VectorXd full = dof_map.expand(reduced);
+        VectorXd forces(full.size());
+        model.multiply(full, forces);
+        model.nonsymmetric_tangent().add_product(full, transposed, forces);
+        VectorXd image = dof_map.vector(forces);
+        dof_map.add_curvature_product(model.residual().gradient, reduced, image);
+        VectorXd correction = wanted - image;
+        solve_with_stored_factor(model, factor, transposed, of_correction, correction);
+        const double length = correction.norm();
+        if (!(length < 0.5 * last)) return;
+        reduced += correction;
+        if (length <= negligible * reduced.norm()) return;
+        last = length;
+    }
+}
 
 SmallDeflection small_deflection(Model& model, const VectorXd& q, const LoadParameters& unloaded,
                                  const LoadParameters& load_parameters,
@@ -151,7 +206,8 @@ VectorXd first_order_change(Model& model, const StaticsResult& equilibrium, cons
     model.evaluate(equilibrium.state, to);
     return state_change(model, equilibrium, to,
                         {.gradient = model.residual().gradient,
-                         .prescribed = model.dof_map().prescribed_increment(equilibrium.state, to)});
+                         .prescribed = model.dof_map().prescribed_increment(equilibrium.state, to)},
+                        false);
 }
 
 StateOnJoints state_on_joints(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
@@ -169,7 +225,7 @@ VectorXd equilibrium_jvp(Model& model, const StaticsResult& equilibrium, ChangeA
         throw InvalidInput("the equilibrium has no factorization: it was solved without gradients");
     model.set_angle_branches(equilibrium.angle_branches);
     model.evaluate(equilibrium.state, equilibrium.load_parameters);
-    return state_change(model, equilibrium, equilibrium.load_parameters, std::move(change));
+    return state_change(model, equilibrium, equilibrium.load_parameters, std::move(change), true);
 }
 
 }  // namespace magshell

@@ -37,6 +37,14 @@ struct StateOnJoints {
 StateOnJoints state_on_joints(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
                               const VectorXd& forces);
 
+/// Returns true if solve_at_equilibrium() needs the Hessian, assembled at the equilibrium.
+bool needs_hessian(const Model& model, const StaticsResult& equilibrium);
+/// Replaces a vector of the free dofs by K^-1 or K^-T of it, to round-off. K: the Hessian of an equilibrium with a stored factorization,
+/// where the model was evaluated last. A factorization of a state nearby is corrected with K itself. Throws InvalidInput if GMRES does
+/// not converge.
+void solve_at_equilibrium(const Model& model, const StaticsResult& equilibrium, bool transposed,
+                          VectorXd& reduced);
+
 /// The derivatives along a direction of the parameters: of the gradient at the fixed state and of what supports and motors
 /// prescribe, of all dofs; and of a state that stays on its joints and of the forces of the fixed gradient on the free dofs there, both
 /// empty if no joint changes.

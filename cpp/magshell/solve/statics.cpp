@@ -294,6 +294,7 @@ class Statics {
     void accept(const VectorXd& state, const LoadParameters& load_parameters, double progress,
                 double residual) {
         result_.state = state;
+        result_.factor_is_exact = false;
         result_.angle_branches = newton_.model().angle_branches();
         result_.load_parameters = load_parameters;
         result_.progress = progress;
@@ -310,7 +311,11 @@ class Statics {
     }
 
     // Decides about stability by the factorization at the solution, with its own stresses.
-    bool check_stability() { return judge(newton_.factorize_at(result_.state, result_.load_parameters)); }
+    bool check_stability() {
+        const FactorReport report = newton_.factorize_at(result_.state, result_.load_parameters);
+        result_.factor_is_exact = true;
+        return judge(report);
+    }
 
     bool judge(const FactorReport& factor) {
         return judge(factor, count_unstable_directions(newton_, factor));
@@ -377,6 +382,7 @@ class Statics {
             !(tiny && newton_.relative_residual(trial, {}) <= newton_.options().tolerance))
             return;
         result_.state = trial;
+        result_.factor_is_exact = false;
         result_.angle_branches = newton_.model().angle_branches();
         result_.residual = std::min(result_.residual, after);
         update_at_roundoff();

@@ -58,7 +58,8 @@ struct StaticsResult {
     double linear_time = 0.0;              // [s] in factorizations and solves
     std::size_t bytes = 0;                 // of the model and the factorization
     std::string factorization;             // name of the factorization
-    std::shared_ptr<const Factor> factor;  // of the Hessian at a stable `state`, if it was to be kept
+    std::shared_ptr<const Factor> factor;  // of the Hessian near a stable `state`, if it was to be kept
+    bool factor_is_exact = false;          // whether it is that at `state` itself
 };
 
 /// Called once per iteration with the load fraction and the residual; throws Interrupted to stop.

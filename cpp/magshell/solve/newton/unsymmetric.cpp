@@ -1,9 +1,5 @@
 #include "magshell/solve/newton/unsymmetric.h"
 
-#include <string>
-
-#include "magshell/core/errors.h"
-
 namespace magshell {
 
 GmresReport solve_unsymmetric(const Model& model, const Factor& factor, bool transposed,
@@ -24,18 +20,6 @@ GmresReport solve_unsymmetric(const Model& model, const Factor& factor, bool tra
         factor.solve(x);
     };
     return gmres(assembled, precondition, reduced, options);
-}
-
-void solve_at_equilibrium(const Model& model, const Factor& factor, bool transposed, VectorXd& reduced) {
-    if (!model.unsymmetric()) {
-        factor.solve(reduced);
-        return;
-    }
-    const GmresReport report = solve_unsymmetric(model, factor, transposed, to_round_off, reduced);
-    if (!report.converged)
-        throw InvalidInput(
-            "a linear solve with a pressure without potential did not converge: its relative residual is " +
-            std::to_string(report.residual));
 }
 
 }  // namespace magshell

@@ -14,8 +14,4 @@ constexpr GmresOptions to_round_off{1e-13, 300};
 GmresReport solve_unsymmetric(const Model& model, const Factor& factor, bool transposed,
                               const GmresOptions& options, VectorXd& reduced);
 
-/// Does the same to round-off, at an equilibrium whose factorization was stored and whose Hessian was assembled last; a symmetric
-/// Hessian takes no iteration. Throws InvalidInput if GMRES does not converge.
-void solve_at_equilibrium(const Model& model, const Factor& factor, bool transposed, VectorXd& reduced);
-
 }  // namespace magshell

@@ -135,6 +135,7 @@ def equilibrium(
 
     If an input is a torch tensor, positions and edge rotations are tensors, with gradients by every input above but `start`.
     A gradient costs one back-substitution with the factorization at the solution, which is kept as long as the result.
+    If the last step was so short that it took none, each gradient assembles the stiffness there, and takes two or three.
     If the solve did not converge, or the equilibrium is not stable, it raises NoGradient.
 
     Second derivatives are those of gradients (create_graph=True, torch.func.hessian, torch.autograd.functional.hvp): a
