@@ -27,7 +27,7 @@ from gradient_kinds_linear import LINEAR_MAKERS
 from gradient_kinds_magnetization import rotating_magnetization
 from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_near_magnets import near_magnets
-from gradient_kinds_own_field import own_field
+from gradient_kinds_own_field import bodies_with_own_field, own_field
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
 from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
 from gradient_kinds_skeletons import (
@@ -386,6 +386,7 @@ MAKERS = {
     "bodies near magnets in motion": lambda: near_magnets(True),
     "two sheets with their own field at rest": lambda: own_field(False),
     "two sheets with their own field in motion": lambda: own_field(True),
+    "bodies with their own field at rest": bodies_with_own_field,
     "custom energies at rest": custom_energies_at_rest,
     "custom energies in motion": custom_energies_in_motion,
     "bodies whose magnetization rotates at rest": lambda: rotating_magnetization(False),

@@ -1,4 +1,4 @@
-"""Kinds of scene in which shells act on each other with their own magnetic field, for gradient_kinds.py."""
+"""Kinds of scene in which bodies act on each other with their own magnetic field, for gradient_kinds.py."""
 
 import numpy as np
 from adjoint_scenes import MESH
@@ -38,4 +38,65 @@ def own_field(moves: bool) -> Kind:
         return Kind(scene, {"time_step": 2e-3, **inputs}, ms.simulate, fixed=fixed, step=1e-4, reach=REACH)
     scene = ms.Scene(sheets, supports=supports, own_field=ms.OwnField(), field=ms.UniformField())
     inputs["applied_flux_density"] = np.array([1e-4, -2e-4, 3e-4])
+    return Kind(scene, inputs, fixed=EXACT, reach=REACH)
+
+
+def bodies_with_own_field() -> Kind:
+    """Build a magnetized solid, a solid with a skin, a curved six-node sheet and a sheet that carries a magnet, at rest.
+
+    They are small and apart, so that few pairs are near, and stiff: sheets of 1 mm and 3 MPa, 0.1 m long, found no rest.
+    """
+    rng = np.random.default_rng(31)
+    rubber = ms.StableNeoHookean(young_modulus=1e6, poisson_ratio=0.3)
+    heavy = {"mass_density": 1.1e3, "element": "linear", "material": rubber}
+    thick = {"thickness": 1.5e-3, "young_modulus": 3e6, "poisson_ratio": 0.3, "mass_density": 1e3}
+    carrier = ms.meshes.rectangle(0.03, 0.012, cells=(3, 1)).transformed(translation=(0.0, 0.0, 0.03))
+    carried = np.argsort(carrier.rest_positions @ (1.0, 0.1, 0.0))[-3:]
+    sheet = ms.Shell(
+        carrier,
+        magnetization_law="rotates",
+        remanent_magnetization=rng.uniform(-3e4, 3e4, (carrier.n_faces, 3)),
+        **thick,
+    )
+    box = ms.meshes.box((0.016, 0.012, 0.01), cells=(1, 1, 1)).transformed(translation=(0.011, 0.013, 0.0))
+    block = ms.Solid(box, **heavy, remanent_magnetization=rng.uniform(-5e4, 5e4, (box.n_tetrahedra, 3)))
+    upper = ms.meshes.box((0.015, 0.012, 0.01), cells=(1, 1, 1)).transformed(
+        translation=(0.017, -0.009, 0.055)
+    )
+    coat = ms.Skin(
+        thickness=1e-3,
+        mass_density=1e3,
+        faces=upper.faces_at(z=0.055),
+        remanent_magnetization=(2e4, -3e4, 4e4),
+    )
+    coated = ms.Solid(upper, **heavy, skin=coat)
+    flat = ms.QuadraticTriangleMesh.from_triangles(ms.meshes.rectangle(0.015, 0.01, cells=(1, 1)))
+    arched = flat.rest_positions + 6.0 * flat.rest_positions[:, :1] ** 2 * (0, 0, 1) + (0.02, -0.03, 0.02)
+    lower = ms.Shell(
+        ms.QuadraticTriangleMesh(arched, flat.elements),
+        remanent_magnetization=rng.uniform(-3e4, 3e4, (2, 3)),
+        **thick,
+    )
+    magnet = ms.RigidBody(
+        carried,
+        body=sheet,
+        mass=2e-4,
+        inertia=np.array([1.2e-8, 0.9e-8, 1.5e-8]),
+        center=carrier.rest_positions[carried].mean(axis=0) + np.array([5e-4, 1e-3, 2e-3]),
+        magnetic_moment=(1e-3, 5e-4, 3e-3),
+    )
+    supports = [
+        ms.Clamp(carrier.edges_at(x=0.0), body=sheet),
+        ms.Pin(box.vertices_at(x=box.rest_positions[:, 0].min()), body=block),
+        ms.Pin(upper.vertices_at(x=upper.rest_positions[:, 0].min()), body=coated),
+        ms.Clamp(lower.mesh.edges_at(x=arched[:, 0].min()), body=lower),
+    ]
+    scene = ms.Scene(
+        [sheet, block, coated, lower, magnet],
+        supports=supports,
+        field=ms.UniformField(),
+        own_field=ms.OwnField(),
+        gravity=(0.2, 0.1, -2.0),
+    )
+    inputs = {"applied_flux_density": np.array([1e-3, -2e-3, 3e-3])}
     return Kind(scene, inputs, fixed=EXACT, reach=REACH)
