@@ -24,9 +24,14 @@ def test_a_random_contact_ends_well_if_contact_is_implicit(seed) -> None:
     assert verdict(seed, ms.TRBDF2(implicit_contact=True)) is None
 
 
-@pytest.mark.parametrize("seed, most", [(63, 29), (86, 43)])
+@pytest.mark.parametrize("seed, most", [(63, 29), (86, 43), (33, 27), (13, 138)])
 def test_a_stage_with_contact_wastes_few_factorizations(seed, most) -> None:
-    """Count factorizations per step: 36 and 53 if Newton's method is given up only after all of its iterations."""
+    """Count factorizations per step.
+
+    They are 36 and 53 if Newton's method is given up only after all of its iterations, 34 if lagged friction of pairs that
+    parted does not count as contact, and 155 if steps with projected matrices are never lengthened. Measured: 20 and 111 in
+    the last two scenes, and 81 to 106 in variants of the method.
+    """
     move, wrong, _ = motion(seed, ms.TRBDF2(implicit_contact=True))
     assert wrong is None
     assert move.factorizations <= most * move.steps

@@ -172,19 +172,27 @@ void Newton::describe_contact(NewtonReport& report) const {
 }
 
 double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
-                           const VectorXd& from, const VectorXd& step, double slope) {
+                           const VectorXd& from, const VectorXd& step, double slope, double longest) {
     constexpr int max_trials = 12;  // see test_strip_folds_onto_itself
     const auto slope_here = [&] { return gradient(q, proximal).dot(step); };
+    const auto slope_at = [&](double length) {
+        q = from;
+        model_.dof_map().retract(q, length * step);
+        evaluate(q, load_parameters, proximal);
+        return slope_here();
+    };
     double alpha_contact = 1.0;
     Bracket ends{0.0, -slope, 1.0, slope_here()};
-    if (ends.at_upper <= flat_slope * slope) return alpha_contact;
+    while (ends.at_upper < -flat_slope * slope && 2.0 * ends.upper <= longest) {
+        const double ahead = 2.0 * ends.upper;
+        if (model_.capabilities().admissible_step_length(from, ahead * step) < 1.0) return ends.upper;
+        ends = {ends.upper, ends.at_upper, ahead, slope_at(ahead)};
+    }
+    if (ends.at_upper <= flat_slope * slope) return ends.upper;
     for (int trial = 0; trial < max_trials; ++trial) {
         // The contact force grows faster than linearly: the Illinois rule halves the slope of the end that stays.
         alpha_contact = ends.secant_zero(bracket_margin);
-        q = from;
-        model_.dof_map().retract(q, alpha_contact * step);
-        evaluate(q, load_parameters, proximal);
-        const double there = slope_here();
+        const double there = slope_at(alpha_contact);
         if (!(std::abs(there) > flat_slope * slope)) break;
         if (there > 0.0)
             ends.move_upper(alpha_contact, there, trial > 0 ? 0.5 : 1.0);

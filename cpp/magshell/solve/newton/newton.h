@@ -143,9 +143,10 @@ class Newton {
     double apply_increment(VectorXd& q, VectorXd& step, double shortest, NewtonReport& report);
     /// Line search along a step that was applied completely and evaluated last. slope: initial decrease of the energy along it [J].
     /// Goes back towards `from` if the energy rises at the end, until its slope is less than half of the initial one.
-    /// Returns the step length that is left.
+    /// Where the energy still falls faster than that at the end, the step is doubled up to the length `longest` (the strong Wolfe
+    /// condition). Returns the step length that is left.
     double line_search(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
-                       const VectorXd& from, const VectorXd& step, double slope);
+                       const VectorXd& from, const VectorXd& step, double slope, double longest = 1.0);
 
     /// Returns the length, in units of `step`, at which bodies in contact do not push back by more than the step predicts; more than 1 if the
     /// predicted force is not reached. alpha: length of `step` over the full Newton step. slope: initial decrease of the energy along

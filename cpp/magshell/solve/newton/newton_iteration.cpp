@@ -60,6 +60,8 @@ constexpr double diverged_step = 1e3;
 constexpr double stale_contact = 0.1;
 // [-] Shortest admissible length of a step with a line search; see test_sheets_pressed_together_by_a_thousand_times_their_weight.
 constexpr double min_search_length = 1e-9;
+// [-] Length of a step with a projected matrix in a time stage, over Newton's; see test_a_stage_with_contact_wastes_few_factorizations.
+constexpr double longest_projected_step = 1024.0;
 // [-] Displacement over the thickness up to which the errors of extrapolated stresses, the square of the step, are negligible; see
 // test_going_on_gives_the_same_bits.
 constexpr double small_move = 1e-4;
@@ -115,7 +117,8 @@ class FullSteps final : public NewtonIteration {
 
     void evaluate_with_contact() {
         evaluate();
-        report_.had_contact |= model_.contacts().has_active_pairs();
+        report_.had_contact |= model_.contacts().has_active_pairs() ||
+                               (proximal_.motion && model_.contacts().has_lagged_pairs());
     }
 
     bool is_done() override {
@@ -165,7 +168,10 @@ class FullSteps final : public NewtonIteration {
         // Before the first step the pressure of a liquid belongs to a volume that it will not keep, so the first matrix is projected,
         // unless that changes other terms too, whose exact matrix is needed.
         const bool begins = mixed_ && !extrapolated_ && !model_.capabilities().has_psd_projection;
-        const bool project_psd = begins || contraction > required_contraction;
+        // A projected matrix converges linearly. In a time stage with contact the exact one is tried after it.
+        const bool alternates = was_projected_ && proximal_.motion && report_.had_contact;
+        const bool project_psd = begins || (contraction > required_contraction && !alternates);
+        was_projected_ = project_psd;
         if (policy_.defers_count) newton_.defer_count();
         report_.factor =
             newton_.factorize(q_, load_parameters_, mixed_ && extrapolated_, proximal_, pull_, project_psd);
@@ -282,7 +288,7 @@ class FullSteps final : public NewtonIteration {
     const double tolerance_;
     VectorXd move_;         // what is left of the prescribed motion
     Eigen::MatrixXd pull_;  // the forces that it causes, once the matrix is factorized
-    bool in_place_ = false, extrapolated_ = false;
+    bool in_place_ = false, extrapolated_ = false, was_projected_ = false;
     Index first_negative_pivots_ = 0;
     double last_step_ = 0.0, step_before_ = 0.0;              // [m]
     double moved_ = std::numeric_limits<double>::infinity();  // [m] displacement since the last factorization
@@ -329,8 +335,11 @@ class SearchedSteps final : public NewtonIteration {
         if (alpha_ < 0.0) return false;
         move_ = newton_.remaining_motion(move_, alpha_, q_, load_parameters_);
         evaluate();
+        // Near a saddle of the energy a projected matrix is far stiffer than the exact one, and its steps are too short.
+        const bool may_lengthen = project_psd && proximal_.motion && alpha_ == 1.0;
         if (in_place)
-            alpha_ *= newton_.line_search(q_, load_parameters_, proximal_, from, step, alpha_ * slope);
+            alpha_ *= newton_.line_search(q_, load_parameters_, proximal_, from, step, alpha_ * slope,
+                                          may_lengthen ? longest_projected_step : 1.0);
         return true;
     }
 

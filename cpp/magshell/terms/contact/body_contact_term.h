@@ -103,6 +103,7 @@ class BodyContactTerm final : public Term {
     /// Makes the contact layer couple these pairs as well, whether they are still active or not, until the next
     /// call.
     void set_extra_couplings(const std::vector<ActiveContact>& active_contacts);
+    bool has_extra_couplings() const { return !extra_couplings_.empty(); }
 
     std::string_view name() const override { return "body contact"; }
     bool set_values(const Values& values) override;

@@ -71,6 +71,8 @@ class Contacts {
     /// Returns true if a pair of faces or edges is in contact at the last evaluated state; with q, at q.
     bool has_active_pairs() const { return bodies_ && !bodies_->evaluated_contacts().empty(); }
     bool has_active_pairs(const VectorXd& q) const { return bodies_ && bodies_->acts(q.data()); }
+    /// Returns true if pairs of the beginning of the step have friction, wherever they are now.
+    bool has_lagged_pairs() const { return bodies_ && bodies_->has_extra_couplings(); }
     /// Returns the directional derivative of that energy along p [J] at the last evaluated state; with q, at q.
     double slope(const VectorXd& p) const { return bodies_ ? bodies_->slope(p.data()) : 0.0; }
     double slope(const VectorXd& q, const VectorXd& p) const {
