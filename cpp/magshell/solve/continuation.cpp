@@ -28,8 +28,8 @@ constexpr double max_obstacle_rotation = 0.5;
 constexpr double coincident_step = 1e-6;
 // [-] Largest distance of supports from their target positions at a point of the path, over the extent; see test_a_clamp_that_shakes.
 constexpr double support_tolerance = 1e-14;
-// [-] Shortest step from a point of the path, over the step that was proposed there; if it fails as well, the path ends. See
-// test_buckling_is_where_the_path_branches.
+// [-] Shortest step of the path, over the longest one before; where none that long succeeds, the path ends. See
+// test_buckling_is_where_the_path_branches and test_a_path_does_not_pass_through_a_small_ball_between_contact_points.
 constexpr double min_step_ratio = 1e-7;
 // [-] A critical point is located once the eigenvalue nearest to zero is below this fraction of the larger one at the ends of the interval,
 // or once the interval is below this fraction of the step; see test_buckling_is_where_the_path_branches.
@@ -206,13 +206,12 @@ class Follower {
     // obstacle is passed through or rotates too far, and the path does not bend too much. Returns false if no step is short enough.
     bool advance(Tangent& tangent) {
         const PathPoint base = result_.points.back();
-        const double shortest = min_step_ratio * step_;
+        longest_ = std::max(longest_, std::min(step_, options_.largest_step));
         bool at_base = true;  // whether the model was last evaluated at the base point
         std::string through;  // the obstacle that the last trial step would pass through
         sides_.remember(base.state, load_parameters(base.parameter));
         for (step_ = std::min(step_, options_.largest_step);; step_ *= 0.5, at_base = false) {
-            if (step_ < shortest)
-                return fail(through.empty() ? "no step along the path converges, however short" : through);
+            if (step_ < min_step_ratio * longest_) return fail(through.empty() ? describe_halt() : through);
             if (!at_base) model_.evaluate(base.state, load_parameters(base.parameter));
             PathPoint next;
             Tangent there;
@@ -242,6 +241,15 @@ class Follower {
             step_ *= std::clamp(std::sqrt(double(target_iterations) / std::max(iterations, 1)), 0.5, 2.0);
             return true;
         }
+    }
+
+    // Says that no step is short enough.
+    std::string describe_halt() const {
+        const std::string halt = "no step along the path converges, however short";
+        if (!model_.contacts().any()) return halt;
+        return halt +
+               ". Where contact begins or ends a path turns sharply: a smaller contact_stiffness or a larger "
+               "smoothing of the contact bends it less, and ms.equilibrium needs no arc length";
     }
 
     // Replaces a point with a path parameter outside its range by an equilibrium at the end of the range, solved from that point. Returns
@@ -371,11 +379,12 @@ class Follower {
     const PathOptions& options_;
     const Until& until_;
     PathResult& result_;
-    Mode nearest_;         // the mode nearest to zero at the point examined last
-    ObstacleSides sides_;  // at the last accepted point
-    VectorXd weight_;      // diagonal matrix of |dx|^2 / extent^2
-    double psi_ = 1.0;     // weight of the path parameter in the arc length
-    double step_ = 0.0;    // arc length of the next or current step
+    Mode nearest_;          // the mode nearest to zero at the point examined last
+    ObstacleSides sides_;   // at the last accepted point
+    VectorXd weight_;       // diagonal matrix of |dx|^2 / extent^2
+    double psi_ = 1.0;      // weight of the path parameter in the arc length
+    double step_ = 0.0;     // arc length of the next or current step
+    double longest_ = 0.0;  // arc length of the longest step so far
 };
 
 }  // namespace
