@@ -11,10 +11,6 @@ namespace {
 // [-] Rms distance from a known equilibrium, over the extent, below which a solution is taken for the same one; see
 // test_both_wells_of_a_bistable_beam.
 constexpr double same_distance = 1e-5;
-// [-] Largest displacement in one step, over the extent; see test_saddles_are_found_with_include_unstable.
-constexpr double longest_step = 0.25;
-// [-] Largest size of the factor between the deflated and the original Newton step; see test_both_wells_of_a_bistable_beam.
-constexpr double max_step_factor = 10.0;
 
 // The deflation operator M(q) of the header, with |.| the root mean square over the area of the bodies.
 class Deflation {
@@ -31,6 +27,8 @@ class Deflation {
             const double square = away.dot(q - each), scale = scale_ * scale_;
             if (square > 0.0) change -= 2.0 * scale * away.dot(step) / (square * (square + scale));
         }
+        // [-] Largest size of this factor; see test_both_wells_of_a_bistable_beam.
+        constexpr double max_step_factor = 10.0;
         const double factor = 1.0 / (1.0 - change);
         return std::isfinite(factor) ? std::clamp(factor, -max_step_factor, max_step_factor)
                                      : max_step_factor;
@@ -74,11 +72,12 @@ class DeflatedSteps final : public NewtonIteration {
         if (!report_.factor.succeeded) return fail(report_.factor.reason);
         VectorXd step = newton_.solve_with_factor(-newton_.gradient(q_, proximal_));
         step *= deflation_.factor(q_, step);
-        const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
-        if (length > longest_step * model_.extent()) step *= longest_step * model_.extent() / length;
-        if (newton_.apply_increment(q_, step, min_step_length, report_) < 0.0) return false;
+        const double longest = good_part * model_.extent();
+        if (const double length = largest_displacement(model_, step); length > longest)
+            step *= longest / length;
+        if (newton_.apply_increment(q_, step, settled_part, report_) < 0.0) return false;
         if (mixed) model_.extrapolate(step);
-        last_step_ = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+        last_step_ = largest_displacement(model_, step);
         evaluate();
         return true;
     }

@@ -14,8 +14,6 @@ namespace {
 
 // [-] Number of steps whose curvature is stored; see test_both_sides_of_a_saddle_cost_the_same.
 constexpr std::size_t descent_history = 12;
-// [-] Longest step, over the extent, and largest multiple of an L-BFGS step; see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double max_step_extent = 0.1, max_step_factor_lbfgs = 4.0;
 // [-] Smallest fraction of a rejected step that is tried next; see test_a_semi_cylinder_pulled_and_pushed.
 constexpr double min_backtrack = 0.05;
 
@@ -37,15 +35,15 @@ class Descent {
         here_ = at(q, energy);
     }
 
-    const DescentState& run(int most_steps) {
+    const DescentState& run() {
         double first = 0.0;  // twice the decrease of the energy that the first step predicts
-        for (int k = 0; k < most_steps; ++k, newton_.count_iteration()) {
+        for (int k = 0; k < iterations_per_factorization; ++k, newton_.count_iteration()) {
             newton_.watch(newton_.relative_residual(here_.q, {}));
             const VectorXd d = direction();
             const double slope = here_.gradient.dot(d), before = here_.energy;
             if (k == 0) first = -slope;
             if (!(slope < 0.0)) break;
-            stationary_ = -slope < negligible_share * first;
+            stationary_ = -slope < hidden_part * first;
             if (stationary_ || !line_search_along(d, slope)) break;
             stationary_ = before - here_.energy <= energy_tolerance * std::abs(before);
             if (stationary_) break;
@@ -73,9 +71,9 @@ class Descent {
     // Searches along d for a state at which the energy no longer falls fast. Returns false if the energy does not fall.
     bool line_search_along(const VectorXd& d, double slope) {
         const VectorXd step = model_.dof_map().expand(d);
-        const double length = step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
+        const double length = largest_displacement(model_, step);
         if (!std::isfinite(length)) return false;
-        double max_alpha = std::min(max_step_factor_lbfgs, max_step_extent * model_.extent() / length);
+        double max_alpha = std::min(large_factor, small_part * model_.extent() / length);
         if (model_.capabilities().has_infeasible_states) {
             const double asked = std::max(1.0, max_alpha);
             max_alpha = std::min(max_alpha,
@@ -85,7 +83,7 @@ class Descent {
         double alpha = std::min(1.0, max_alpha), last = 0.0, last_slope = slope, accepted_alpha = 0.0;
         bool too_far = false;
         DescentState end;
-        for (int trial = 0; trial < max_attempts; ++trial) {
+        for (int trial = 0; trial < few; ++trial) {
             VectorXd there = here_.q;
             model_.dof_map().retract(there, alpha * step);
             const double energy = model_.energy(there, load_parameters_), change = energy - here_.energy;
@@ -98,7 +96,7 @@ class Descent {
                 too_far = true;
                 const double bottom =
                     std::isfinite(change) ? -0.5 * slope * alpha * alpha / (change - slope * alpha) : 0.0;
-                alpha = std::clamp(bottom, min_backtrack * alpha, 0.5 * alpha);
+                alpha = std::clamp(bottom, min_backtrack * alpha, progress_part * alpha);
                 continue;
             }
             if (accepted_alpha > 0.0 && !(energy < end.energy)) break;
@@ -106,13 +104,13 @@ class Descent {
             end = at(there, energy);
             accepted_alpha = alpha;
             const double slope_there = end.gradient.dot(d);
-            if (slope_there > flat_slope * slope || alpha >= max_alpha || too_far) break;
+            if (slope_there > progress_part * slope || alpha >= max_alpha || too_far) break;
             // The energy still falls fast: extrapolates its slope linearly to find a longer step.
             const double flatter = slope_there - last_slope;
             const double secant = flatter > 0.0 ? alpha - slope_there * (alpha - last) / flatter : max_alpha;
             last = alpha;
             last_slope = slope_there;
-            alpha = std::min(max_alpha, std::clamp(secant, 1.5 * alpha, 4.0 * alpha));
+            alpha = std::min({secant, large_factor * alpha, max_alpha});
         }
         if (accepted_alpha == 0.0) return false;
         history_.add(accepted_alpha * d, end.gradient - here_.gradient);
@@ -131,11 +129,10 @@ class Descent {
 
 }  // namespace
 
-LbfgsRound lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters,
-                         int most_steps) {
+LbfgsRound lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters) {
     Descent descent(newton, load_parameters, q, energy);
-    const DescentState& end = descent.run(most_steps);
-    const double moved = (end.q - q).head(newton.model().n_coordinates()).lpNorm<Eigen::Infinity>();
+    const DescentState& end = descent.run();
+    const double moved = largest_displacement(newton.model(), end.q - q);
     q = end.q;
     energy = end.energy;
     return {moved, descent.stationary(), descent.crossing_reason()};

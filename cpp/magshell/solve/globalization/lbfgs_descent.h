@@ -11,22 +11,14 @@
 
 namespace magshell {
 
-// [-] Increase of the energy that counts as none, over its size; see test_small_load_on_a_shallow_roof.
-constexpr double energy_tolerance = 1e-12;
-// [-] Decrease of the energy that counts as none, over the one it is compared with: of the first step of a descent, or of the other
-// side of a saddle. See test_a_flat_strip_far_beyond_where_it_buckles.
-constexpr double negligible_share = 1e-6;
-// Attempts at a step, each with a shorter one, at most; see test_small_load_on_a_shallow_roof.
-constexpr int max_attempts = 8;
-
 struct LbfgsRound {
     double displacement = 0.0;    // [m] the largest, or 0 if no step lowers the energy
     bool stationary = false;      // whether it ended because the energy no longer falls
     std::string crossing_reason;  // why an obstacle refused a trial, in words; empty if none did
 };
 
-/// Descends from q, whose energy is given, with Newton's last factorization, which must be positive definite. Updates q and its energy.
-LbfgsRound lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters,
-                         int most_steps);
+/// Descends from q, whose energy is given, with Newton's last factorization, which must be positive definite, in steps that together cost as
+/// much as that factorization. Updates q and its energy.
+LbfgsRound lbfgs_descent(Newton& newton, VectorXd& q, double& energy, const LoadParameters& load_parameters);
 
 }  // namespace magshell

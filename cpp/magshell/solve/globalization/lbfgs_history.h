@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "magshell/core/types.h"
+#include "magshell/solve/step_rules.h"
 
 namespace magshell {
 
@@ -17,11 +17,9 @@ class LbfgsHistory {
 
     /// Stores a step and the change of the gradient along it, unless the change shows no positive curvature.
     void add(VectorXd step, VectorXd change) {
-        // [-] Smallest cosine between a step and its change of the gradient; see test_rounds_as_they_are_lead_there_too.
-        constexpr double min_cosine = 1e-12;
         if (most_ == 0) return;
         const double curvature = step.dot(change);
-        if (!(curvature > min_cosine * step.norm() * change.norm())) return;
+        if (!(curvature > energy_tolerance * step.norm() * change.norm())) return;
         if (pairs_.size() == most_) pairs_.pop_front();
         pairs_.push_back({std::move(step), std::move(change), 1.0 / curvature});
     }

@@ -14,28 +14,13 @@
 namespace magshell {
 namespace {
 
-// [-] Ratio of actual to predicted decrease above which L-BFGS steps follow; below it a trust region would shrink (N&W 4.1).
-// See test_a_semi_cylinder_pulled_and_pushed.
-constexpr double good_ratio = 0.25;
-// [-] Factor by which the shift is lowered, and first raised [Waechter, Biegler 2006]; see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double shift_factor = 8.0;
-// [-] Shift, over the stiffness of the body along the step, below which it is left out; see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double negligible_shift = 0.01;
-// Number of L-BFGS steps with one factorization, at most; see test_both_sides_of_a_saddle_cost_the_same.
-constexpr int max_lbfgs_steps = 20;
-// Number of rounds of L-BFGS in a row until mixed iterations are tried; see test_hard_case_reaches_its_answer.
-constexpr int patience = 8;
 // [-] Decrease of the energy, over its size, below which a settled step counts as idle, and the number of them in a row after which no
 // equilibrium is expected: obstacles may hold a body where its energy still falls. See
 // test_a_small_ball_that_would_slip_between_contact_points_is_an_error.
 constexpr double idle_decrease = 1e-10;
 constexpr int max_idle_steps = 5;  // see test_a_small_ball_that_would_slip_between_contact_points_is_an_error
-// [-] Displacement over the extent below which a step has settled, at an equilibrium or a saddle; see
-// test_a_compressed_strip_leaves_the_saddle.
-constexpr double settled_length = 1e-4;
-// [-] Length of a Newton step over the extent below which round-off hides the change of the energy; see
-// test_small_load_on_a_shallow_roof.
-constexpr double hidden_length = 1e-6;
+// [-] First shift, over the one that holds the body against the forces; see test_both_sides_of_a_saddle_cost_the_same.
+constexpr double first_shift = 0.02;
 
 class ProximalContinuation {
   public:
@@ -45,7 +30,7 @@ class ProximalContinuation {
           model_(newton.model()),
           q_(q),
           load_parameters_(load_parameters),
-          settled_(settled_length * model_.extent()) {}
+          settled_(settled_part * model_.extent()) {}
 
     RelaxationReport run(int max_steps) {
         if (!begin()) {
@@ -145,7 +130,7 @@ class ProximalContinuation {
             if (mode.eigenvalue < 0.0) leave_saddle(mode);
             newton_.evaluate(q_, load_parameters_, {});
         } else if (shift_ == 0.0) {
-            raise_shift(shift_factor);
+            raise_shift(largest_factor);
         }
         return factorize_definite() ||
                fail(factor_.succeeded ? "no step lowers the energy, however short" : factor_.reason);
@@ -154,13 +139,13 @@ class ProximalContinuation {
     // Takes one step by L-BFGS or by mixed iterations. Returns false, with a reason in the report, if no attempt lowers the energy.
     bool advance() {
         const double before = energy_;
-        for (int attempt = 0; attempt < max_attempts; ++attempt) {
+        for (int attempt = 0; attempt < few; ++attempt) {
             const double whole = length(step_), stiffness = slope() / square(step_);
             const bool finishes = shift_ == 0.0 && whole < settled_step * model_.extent();
             if (finishes ? reach_proximal_point() : take_step()) {
                 if (shift_ > 0.0) last_shift_ = shift_;
-                shift_ /= shift_factor;
-                if (shift_ < negligible_shift * stiffness) shift_ = 0.0;
+                shift_ /= largest_factor;
+                if (shift_ < negligible_part * stiffness) shift_ = 0.0;
                 const bool hardly_lower =
                     has_potential() && before - energy_ <= idle_decrease * std::abs(energy_);
                 const bool idle = !solved_ && report_.last_displacement < settled_ &&
@@ -171,8 +156,8 @@ class ProximalContinuation {
             }
             const bool moved = keep_best_state();
             // The next step becomes shorter by the factor, and no longer than the extent.
-            const double shorter = std::max(shift_factor, whole / model_.extent());
-            shift_ = std::max(shift_factor * shift_, shift_ + (shorter - 1.0) * stiffness);
+            const double shorter = std::max(largest_factor, whole / model_.extent());
+            shift_ = std::max(largest_factor * shift_, shift_ + (shorter - 1.0) * stiffness);
             last_shift_ = shift_;
             if (moved) return true;
             newton_.evaluate(q_, load_parameters_, {});
@@ -189,7 +174,7 @@ class ProximalContinuation {
         const double before = energy_;
         const int factorizations = newton_.factorizations() - 1;
         const auto gain = [&] { return (before - energy_) / (newton_.factorizations() - factorizations); };
-        if (mixed_gain_ == 0.0 && lbfgs_rounds_ < patience) {
+        if (mixed_gain_ == 0.0 && lbfgs_rounds_ < few) {
             if (!predicts_well() || !lbfgs_round()) return reach_proximal_point();
             ++lbfgs_rounds_;
             lbfgs_gain_ = gain();
@@ -197,7 +182,7 @@ class ProximalContinuation {
         }
         lbfgs_rounds_ = 0;
         const bool reached = reach_proximal_point();
-        const double now = reached ? gain() : mixed_gain_ / shift_factor;
+        const double now = reached ? gain() : mixed_gain_ / largest_factor;
         const bool pays = now > lbfgs_gain_ || (reached && now > mixed_gain_);
         mixed_gain_ = pays ? now : 0.0;
         return reached;
@@ -209,16 +194,16 @@ class ProximalContinuation {
         const double predicted = 0.5 * (slope() + shift_ * square(step_));
         VectorXd trial = q_, step = step_;
         NewtonReport ignored;
-        const bool feasible = newton_.apply_increment(trial, step, min_step_length, ignored) >= 0.0;
+        const bool feasible = newton_.apply_increment(trial, step, settled_part, ignored) >= 0.0;
         const double energy = feasible ? model_.energy(trial, load_parameters_) : energy_;
         model_.set_angle_branches(angle_branches);
-        return energy_ - energy > good_ratio * predicted;
+        return energy_ - energy > good_part * predicted;
     }
 
     // Descends by L-BFGS steps with the factorization at hand. Returns false, and leaves q as it was, if they do not get anywhere.
     bool lbfgs_round() {
         const double before = energy_;
-        LbfgsRound round = lbfgs_descent(newton_, q_, energy_, load_parameters_, max_lbfgs_steps);
+        LbfgsRound round = lbfgs_descent(newton_, q_, energy_, load_parameters_);
         stationary_ = round.stationary;
         if (!round.crossing_reason.empty()) crossing_reason_ = std::move(round.crossing_reason);
         if (!(energy_ < before)) {
@@ -259,7 +244,7 @@ class ProximalContinuation {
         // Round-off hides the change of the energy along a very short step; the state must then be as near as the step predicts.
         const double expected = length(step_);
         const bool as_expected =
-            expected <= hidden_length * model_.extent() && length(trial - from) <= 3.0 * expected;
+            expected <= hidden_part * model_.extent() && length(trial - from) <= 3.0 * expected;
         const bool too_long = length(trial - from) > model_.extent();
         const bool lower =
             !has_potential() || as_expected || energy <= energy_ + energy_tolerance * std::abs(energy_);
@@ -315,14 +300,11 @@ class ProximalContinuation {
         };
         const auto down = [&](double sign) {
             // A straight displacement stretches a thin shell, so the first one may have to be very short.
-            // [-] of the usual one, and of the one before; fixed by thin sheets in
-            // test_counts_of_every_family_are_those_of_the_last_release
-            constexpr double least = 1e-6, shorter = 0.1;
             double amplitude = settled_;
             Side side = at(sign * amplitude);
-            while (!(side.energy < energy_) && amplitude > least * settled_)
-                side = at(sign * (amplitude *= shorter));
-            for (amplitude *= 2.0; amplitude < model_.extent(); amplitude *= 2.0) {
+            while (!(side.energy < energy_) && amplitude > hidden_part * settled_)
+                side = at(sign * (amplitude *= small_part));
+            for (amplitude *= step_factor; amplitude < model_.extent(); amplitude *= step_factor) {
                 Side next = at(sign * amplitude);
                 if (!(next.energy < side.energy)) break;
                 side = std::move(next);
@@ -336,7 +318,7 @@ class ProximalContinuation {
         // Contact ends every displacement early on both sides, so that depths cannot be compared.
         const bool compared = !(model_.capabilities().has_barrier && std::isfinite(one.energy));
         const Side other = compared ? down(-1.0) : one;
-        const double equal = negligible_share * (energy_ - one.energy) + energy_tolerance * std::abs(energy_);
+        const double equal = hidden_part * (energy_ - one.energy) + energy_tolerance * std::abs(energy_);
         const bool deeper = one.energy - other.energy > equal;
         if (compared && std::abs(one.energy - other.energy) <= equal) ++report_.symmetric_saddles;
         const Side& better = deeper || !std::isfinite(one.energy) ? other : one;
@@ -351,7 +333,7 @@ class ProximalContinuation {
     // been evaluated at q. Returns false if the shift becomes so large that no step is left.
     bool factorize_definite() {
         Eigen::MatrixXd no_moves(q_.size(), 0);
-        for (double times = shift_factor;; times *= shift_factor) {
+        for (double times = largest_factor;; times *= largest_factor) {
             const VectorXd weights = shift_ * model_.metric();
             const FactorReport factor =
                 newton_.factorize(q_, load_parameters_, false, {&weights, &q_}, no_moves);
@@ -362,21 +344,19 @@ class ProximalContinuation {
             }
             raise_shift(times);
             // No step is left that is not settled.
-            if (!(shift_ > 0.0 && settled_length * shift_ <= std::max(largest_stiffness(), forced_shift())))
+            if (!(shift_ > 0.0 && settled_part * shift_ <= std::max(largest_stiffness(), forced_shift())))
                 return false;
         }
     }
 
     // Multiplies the shift, or begins with a part of the last one, or of the one that holds the body against the forces.
     void raise_shift(double times) {
-        // [-] First shift, over forced_shift(); see test_both_sides_of_a_saddle_cost_the_same.
-        constexpr double first = 0.02;
         if (shift_ > 0.0)
             shift_ *= times;
         else if (last_shift_ > 0.0)
-            shift_ = last_shift_ / shift_factor;
+            shift_ = last_shift_ / largest_factor;
         else
-            shift_ = std::max(first * forced_shift(), energy_tolerance * largest_stiffness());
+            shift_ = std::max(first_shift * forced_shift(), energy_tolerance * largest_stiffness());
     }
 
     // Returns false if the energy does not decide which step is good, since some forces are not its derivatives: followers, torques on
@@ -384,9 +364,7 @@ class ProximalContinuation {
     bool has_potential() const { return !newton_.is_unsymmetric(); }
 
     VectorXd newton_step() const { return newton_.solve_with_factor(-newton_.gradient(q_, {})); }
-    double length(const VectorXd& p) const {
-        return p.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>();
-    }
+    double length(const VectorXd& p) const { return largest_displacement(model_, p); }
     double square(const VectorXd& p) const { return p.dot(model_.metric().cwiseProduct(p)); }
     double slope() const { return std::abs(newton_.gradient(q_, {}).dot(step_)); }
 

@@ -2,8 +2,9 @@
 
 #include <utility>
 
-#include "magshell/solve/globalization/contact_predictor.h"
+#include "magshell/solve/motion/contact_predictor.h"
 #include "magshell/solve/motion/motor_reactions.h"
+#include "magshell/solve/motion/stage_descent.h"
 #include "magshell/solve/motion/step_error.h"
 
 namespace magshell {
@@ -58,23 +59,26 @@ NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadPar
     }
     const VectorXd predicted = q;
     const Model::AngleBranches angle_branches = model.angle_branches();
-    NewtonReport report =
-        newton_.solve(q, load_parameters, {.proximal = proximal, .defers_count = true, .factor = factor});
-    if (factor && !report.converged) {
+    const Capabilities& has = model.capabilities();
+    NewtonPolicy policy{.proximal = proximal, .defers_count = true, .factor = factor};
+    if (has.has_stiffness_jumps)
+        policy.landing = [&](const VectorXd& there, const VectorXd& step) {
+            return predict_contact(model, there, load_parameters, *proximal.weights,
+                                   model.contacts().predicted_points(step));
+        };
+    NewtonReport report = newton_.solve(q, load_parameters, policy);
+    if (std::exchange(policy.factor, nullptr) && !report.converged) {
         q = predicted;
         model.set_angle_branches(angle_branches);
-        report = newton_.solve(q, load_parameters, {.proximal = proximal, .defers_count = true});
+        report = newton_.solve(q, load_parameters, policy);
     }
     // After contact between bodies, Newton has used its line search already.
-    const Capabilities& has = model.capabilities();
     const bool searched = has.has_barrier && report.had_contact;
     if (report.converged || searched || !(has.has_stiffness_jumps || newton_.options().mixed)) return report;
     q = predicted;
     model.set_angle_branches(angle_branches);
-    NewtonPolicy standard{
-        .proximal = proximal, .mixed = false, .search_at_barrier = false, .defers_count = true};
+    policy.mixed = policy.search_at_barrier = false;
     if (has.has_stiffness_jumps) {
-        standard.steps = NewtonPolicy::Steps::descending;
         // The prediction may lie in another valley: the descent begins where its energy is lower.
         const auto energy = [&](const VectorXd& there) {
             const VectorXd away = there - *proximal.target;
@@ -87,8 +91,10 @@ NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadPar
             model.set_angle_branches(angle_branches);
         else
             q = begin.q;
+        policy.defers_count = false;
+        return descend_in_rounds(newton_, q, load_parameters, policy);
     }
-    return newton_.solve(q, load_parameters, standard);
+    return newton_.solve(q, load_parameters, policy);
 }
 
 const Tableau& Stepper::tableau_from(const MotionState& state, bool dissipative) const {

@@ -35,11 +35,6 @@ constexpr double negligible_move = 1e-7;
 constexpr double nearby_gradient_tolerance = 1e-14;  // [-] see test_over_200_steps_against_differences
 constexpr int nearby_gradient_vectors = 30;          // see test_over_200_steps_against_differences
 
-// [-] Step length below which the report names the elements or faces that limit it; see test_relaxation_that_ends_early_reports_contacts.
-constexpr double blocked_step_length = 0.1;
-// [-] Distance of a trial from the ends of its bracket, over its width; see test_strip_folds_onto_itself.
-constexpr double bracket_margin = 0.1;
-
 // Adds the time it exists to a sum [s].
 class Stopwatch {
   public:
@@ -118,8 +113,8 @@ double Newton::apply_increment(VectorXd& q, VectorXd& step, double shortest, New
     }
     if (model_.capabilities().has_barrier) {
         report.had_contact |= alpha < 1.0;
-        report.blocked_by = alpha < blocked_step_length ? model_.capabilities().describe_blocked_step(q, step)
-                                                        : std::string();
+        report.blocked_by =
+            alpha < small_part ? model_.capabilities().describe_blocked_step(q, step) : std::string();
     }
     if (alpha < 1.0) step *= alpha;
     model_.dof_map().retract(q, step);
@@ -133,8 +128,8 @@ double Newton::apply_increment(VectorXd& q, VectorXd& step, double shortest, New
 double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, double alpha,
                                    double slope) const {
     constexpr int max_trials = 6;  // see test_strip_folds_onto_itself
-    // [-] Longest step, and remaining slope below which a longer one is not tried; see test_block_on_a_slope_sticks_or_slides.
-    constexpr double longest = 8.0, remaining_slope = 0.2;
+    // [-] Remaining slope below which a longer step is not tried; see test_block_on_a_slope_sticks_or_slides.
+    constexpr double remaining_slope = 0.2;
     if (!(slope > 0.0)) return 1.0;
     const Contacts& contact = model_.contacts();
     const auto pushed_back = [&](double alpha_contact) {
@@ -148,16 +143,16 @@ double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, doub
                alpha_contact * stiffness;
     };
     Bracket ends{0.0, -slope, 1.0, slope_at(1.0)};
-    while (alpha == 1.0 && ends.at_upper < -remaining_slope * slope && ends.upper < longest)
-        ends = {ends.upper, ends.at_upper, 2.0 * ends.upper, slope_at(2.0 * ends.upper)};
-    if (ends.at_upper <= flat_slope * slope) return ends.upper;
+    while (alpha == 1.0 && ends.at_upper < -remaining_slope * slope && ends.upper < largest_factor)
+        ends = {ends.upper, ends.at_upper, step_factor * ends.upper, slope_at(step_factor * ends.upper)};
+    if (ends.at_upper <= progress_part * slope) return ends.upper;
     for (int trial = 0; trial < max_trials; ++trial) {
         // Contact forces grow faster than linearly, so a secant falls short; the Illinois rule halves the slope of the end that stays.
-        const double alpha_contact = ends.secant_zero(bracket_margin), there = slope_at(alpha_contact);
-        if (there > flat_slope * slope)
-            ends.move_upper(alpha_contact, there, trial > 0 ? 0.5 : 1.0);
-        else if (there < -flat_slope * slope)
-            ends.move_lower(alpha_contact, there, 0.5);
+        const double alpha_contact = ends.secant_zero(small_part), there = slope_at(alpha_contact);
+        if (there > progress_part * slope)
+            ends.move_upper(alpha_contact, there, trial > 0 ? progress_part : 1.0);
+        else if (there < -progress_part * slope)
+            ends.move_lower(alpha_contact, there, progress_part);
         else
             return alpha_contact;
     }
@@ -183,21 +178,21 @@ double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, c
     };
     double alpha_contact = 1.0;
     Bracket ends{0.0, -slope, 1.0, slope_here()};
-    while (ends.at_upper < -flat_slope * slope && 2.0 * ends.upper <= longest) {
+    while (ends.at_upper < -progress_part * slope && 2.0 * ends.upper <= longest) {
         const double ahead = 2.0 * ends.upper;
         if (model_.capabilities().admissible_step_length(from, ahead * step) < 1.0) return ends.upper;
         ends = {ends.upper, ends.at_upper, ahead, slope_at(ahead)};
     }
-    if (ends.at_upper <= flat_slope * slope) return ends.upper;
+    if (ends.at_upper <= progress_part * slope) return ends.upper;
     for (int trial = 0; trial < max_trials; ++trial) {
         // The contact force grows faster than linearly: the Illinois rule halves the slope of the end that stays.
-        alpha_contact = ends.secant_zero(bracket_margin);
+        alpha_contact = ends.secant_zero(small_part);
         const double there = slope_at(alpha_contact);
-        if (!(std::abs(there) > flat_slope * slope)) break;
+        if (!(std::abs(there) > progress_part * slope)) break;
         if (there > 0.0)
-            ends.move_upper(alpha_contact, there, trial > 0 ? 0.5 : 1.0);
+            ends.move_upper(alpha_contact, there, trial > 0 ? progress_part : 1.0);
         else
-            ends.move_lower(alpha_contact, there, trial > 0 ? 0.5 : 1.0);
+            ends.move_lower(alpha_contact, there, trial > 0 ? progress_part : 1.0);
     }
     return alpha_contact;
 }
@@ -213,13 +208,10 @@ bool Newton::is_negligible(double displacement) const {
 }
 
 bool Newton::is_negligible(const VectorXd& step) const {
-    return is_negligible(step.head(model_.n_coordinates()).lpNorm<Eigen::Infinity>());
+    return is_negligible(largest_displacement(model_, step));
 }
 
 void Newton::check_effort() const {
-    // [-] Iterations without a factorization that cost as much as one: each takes a gradient and two triangular solves. See
-    // test_bounded_effort.py.
-    constexpr int iterations_per_factorization = 20;
     const int without = std::max(0, iterations_ - factorizations_);
     if (max_factorizations_ > 0 &&
         factorizations_ + without / iterations_per_factorization >= max_factorizations_)

@@ -44,12 +44,7 @@ struct ProximalTerm {
 
 /// How one solve iterates. The defaults solve for a stationary point of the energy, as exactly as the options say.
 struct NewtonPolicy {
-    /// full: full steps, shortened only where states have no energy. descending: standard steps that lower the energy of a time stage, in
-    /// rounds with fixed normal forces of friction; slower, and robust if contacts open and close, stick and slip. It needs a proximal term.
-    enum class Steps { full, descending };
-
     ProximalTerm proximal = {};
-    Steps steps = Steps::full;
     bool mixed = true;       // false: standard steps, whatever the options say
     int max_iterations = 0;  // 0: as the options say
     /// Near a barrier full steps may fail; standard steps with a line search on the slope of the energy follow, with matrices
@@ -67,6 +62,8 @@ struct NewtonPolicy {
         nullptr;  // of the last factorization, if it was made at or near the state where the solve begins
     std::function<VectorXd(const VectorXd&)> correction =
         {};  // returns what to add to the first step, or an empty vector
+    std::function<VectorXd(const VectorXd& q, const VectorXd& step)> landing =
+        {};  // returns what to add to q at the end of a step, or an empty vector
     std::function<void(const VectorXd&)> visit = {};  // called with every state after the first
 };
 
@@ -187,8 +184,6 @@ class Newton {
     }
 
   private:
-    NewtonReport solve_in_rounds(VectorXd& q, const LoadParameters& load_parameters,
-                                 const NewtonPolicy& policy);
     /// Appends the blocking faces, or those with the largest contact force, to the reason of a report.
     void describe_contact(NewtonReport& report) const;
     void assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,

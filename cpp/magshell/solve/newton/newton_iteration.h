@@ -4,19 +4,9 @@
 #include <string>
 
 #include "magshell/solve/newton/newton.h"
+#include "magshell/solve/step_rules.h"
 
 namespace magshell {
-
-// [-] Last step of a converged iteration, over the extent; see test_fine_roof_takes_small_steps.
-constexpr double settled_step = 1e-3;
-// [-] Shortest part of a step that is taken where the whole one leads to states without an energy; see
-// test_landing_solid_is_not_inverted.
-constexpr double min_step_length = 1e-4;
-// [-] Length that counts as zero, over the extent; see test_a_thin_strip_rolled_up and test_fine_roof_takes_small_steps.
-constexpr double negligible_length = 1e-9;
-// [-] Slope of the energy at which a line search ends, over that at its beginning: the curvature condition (N&W 3.1). See
-// test_a_semi_cylinder_pulled_and_pushed and test_strip_folds_onto_itself.
-constexpr double flat_slope = 0.5;
 
 class NewtonIteration {
   public:

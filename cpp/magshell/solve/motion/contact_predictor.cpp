@@ -1,4 +1,4 @@
-#include "magshell/solve/globalization/contact_predictor.h"
+#include "magshell/solve/motion/contact_predictor.h"
 
 #include <algorithm>
 #include <cmath>
