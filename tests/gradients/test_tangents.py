@@ -13,6 +13,10 @@ from both_modes import by_both_modes, direction  # noqa: E402
 from torch.autograd import forward_ad  # noqa: E402
 
 LARGE = 1e-3  # m, of meshes of 0.1 m
+CARRIED = "at rest, with a rigid part"  # whose vertices have no tangents by rest positions
+# Contacts of edges with the same area at rest count the smaller one, which has a kink there: the differences that give
+# tangents converge by the first power of the step.
+BY_REST = {"sheets at rest on each other": 2e-7, "sheets at rest on each other, penalty": 2e-7}
 AT_REST = [name for name in MAKERS if kind(name).function is ms.equilibrium]
 PRECISION, ROUNDING = 1e-9, 1e-14  # of the tangent, and of the result itself
 # Tangents of a response about an equilibrium contain differences of its stiffness, whose errors bending amplifies.
@@ -71,11 +75,16 @@ def test_tangents_agree_with_gradients_in_every_kind(name):
     start = start if isinstance(start, ms.Equilibrium | ms.EquilibriumSet) else None
     alone = [{key: value} for key, value in kind(name).entries.items()]
     for given in (*alone, kind(name).together):
+        given = {key: value for key, value in given.items() if name != CARRIED or key[1] != "rest_positions"}
+        if not given:
+            continue
         tensors = {key: torch.tensor(value, requires_grad=True) for key, value in given.items()}
         results = [each for each in results_of(kind(name).found(tensors, start)) if each.requires_grad]
         inputs = list(tensors.values())
         along = [direction(name, key, value, rng) for key, value in given.items()]
         found = by_both_modes(results, inputs, along, rng)
+        if any(key[1] == "rest_positions" for key in given):
+            precision = max(precision, BY_REST.get(name, 0.0))
         bound = precision * found.size + ROUNDING * found.size_of_results
         told = ", ".join(label(kind(name), key) for key in given)
         assert found.forward == pytest.approx(found.backward, rel=0.0, abs=bound), told

@@ -396,6 +396,10 @@ MAKERS = {
     **LINEAR_MAKERS,
     **ATTACHED_MAKERS,
     **BATCH_MAKERS,
+    "on springs between points at rest": lambda: on_springs_at_rest(foundations=False),
+    "on springs between points in motion": lambda: on_springs_in_motion(
+        ms.TRBDF2(), damped=True, foundations=False
+    ),
 }
 
 

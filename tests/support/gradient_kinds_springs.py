@@ -11,7 +11,7 @@ SOME = np.random.default_rng(23)
 TIPS = MESH.rest_positions[MESH.vertices_at(x=0.1)]
 
 
-def _on_springs(damped: bool) -> tuple[list, list, list]:
+def _on_springs(damped: bool, foundations: bool = True) -> tuple[list, list, list]:
     """Return bodies, supports and springs of all kinds: a clamped sheet, and a weight that hangs from it."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     weight = ms.RigidBody(mass=2e-3, inertia=1e-6, center=(0.08, 0.02, -0.04))
@@ -45,20 +45,20 @@ def _on_springs(damped: bool) -> tuple[list, list, list]:
         ),
         ms.ElasticFoundation(200.0, body=sheet),
     ]
-    return [sheet, weight], [clamp], springs
+    return [sheet, weight], [clamp], springs if foundations else springs[:-2]
 
 
-def on_springs_at_rest() -> Kind:
-    bodies, supports, springs = _on_springs(damped=False)
+def on_springs_at_rest(foundations: bool = True) -> Kind:
+    bodies, supports, springs = _on_springs(damped=False, foundations=foundations)
     scene = ms.Scene(
         bodies, supports=supports, loads=springs, gravity=(0.2, 0.1, -9.81), allow_rigid_motions=True
     )
     return Kind(scene, {"gravity_factor": 0.9}, fixed=EXACT, reach=REACH)
 
 
-def on_springs_in_motion(integrator, damped: bool, **options) -> Kind:
+def on_springs_in_motion(integrator, damped: bool, foundations: bool = True, **options) -> Kind:
     """Build a motion in which all numbers of the springs change that can."""
-    bodies, supports, springs = _on_springs(damped)
+    bodies, supports, springs = _on_springs(damped, foundations)
     scene = ms.Scene(
         bodies, supports=supports, loads=springs, gravity=(0.2, 0.1, -9.81), allow_rigid_motions=True
     )

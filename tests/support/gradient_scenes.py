@@ -83,9 +83,12 @@ class Kind:
         """Return whether the solve takes this value, and has a gradient by it."""
         if name != "rest_positions":
             return True
-        turning = self.function is ms.simulate and any(
-            isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
-            for each in self.scene.supports
+        turning = self.function is ms.simulate and (
+            any(
+                isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
+                for each in self.scene.supports
+            )
+            or any(part.vertices is not None for part in self.scene.rigid_parts)
         )
         return not (self.of_linear or turning) and rest_positions_follow(self.scene, owner)
 
@@ -133,7 +136,8 @@ class Kind:
             for (owner, name), value in once.items()
         }
         if self.scene.rigid_parts:  # which a start must not bend
-            moved |= {key: value for key, value in once.items() if key[1] in ("start", "velocities")}
+            given = ("start", "velocities", "rest_positions")
+            moved |= {key: value for key, value in once.items() if key[1] in given}
         return moved
 
     def _once(self, key: tuple) -> bool:
@@ -215,6 +219,8 @@ def rest_positions_follow(scene: ms.Scene, body) -> bool:
         return False  # vertices must stay in the plane: test_rest_positions.py moves them within
     if scene.ties:
         return False  # welded vertices must move together: test_rest_positions_of_assemblies.py moves them
+    if any(isinstance(support, ms.Periodic) for support in scene.supports):
+        return False  # images must stay images: test_rest_positions_of_connections.py moves them so
     given = torch.tensor(body.rest_positions, requires_grad=True)
     try:
         reshaped(scene, {body: {"rest_positions": given}})

@@ -51,7 +51,7 @@ class Backward {
         }
         back_to_start();
         model_.dof_map().project_state_vjp(motion_.start.q, motion_.start.v, g_.positions, g_.velocities,
-                                           scene_);
+                                           scene_, g_.rest.asked ? &g_.rest.by_nodes : nullptr);
         if (g_.rest.asked) g_.rest.add_directions_at_start(model_, g_.positions);
         g_.values = std::move(scene_.values);
         g_.factorizations = newton_.factorizations();
@@ -274,8 +274,12 @@ class Backward {
                            from_force = force - mass.cwiseProduct(c);
             dof_map.add_curvature_forces(from_c, c, by_free);
             dof_map.add_curvature_forces(from_force, moved, by_free);
+            const VectorXd nothing = VectorXd::Zero(q.size());
+            if (g_.rest.asked) {
+                dof_map.rest_vjp(nothing, c, from_c, {}, g_.rest.by_nodes);
+                dof_map.rest_vjp(nothing, moved, from_force, {}, g_.rest.by_nodes);
+            }
             if (dof_map.has_values()) {
-                const VectorXd nothing = VectorXd::Zero(q.size());
                 dof_map.vjp(nothing, c, from_c, load_parameters, scene_);
                 dof_map.vjp(nothing, moved, from_force, load_parameters, scene_);
             }
@@ -396,19 +400,23 @@ class Backward {
         model_.parameters().vjp(q, load_parameters, all, scene_);
         g_.rest.add(model_, q, load_parameters, all);
         KinematicsGradient by_forces;
-        if (model_.capabilities().has_velocity_forces)
+        if (model_.capabilities().has_velocity_forces) {
             by_forces = model_.parameters().forces_vjp(model_.kinematics(), load_parameters, all, scene_);
-        if (by_contact.size() > 0)
+            g_.rest.add_forces(model_, all);
+        }
+        if (by_contact.size() > 0) {
             model_.contacts().vjp(q, model_.kinematics(), load_parameters, by_contact, by_forces, scene_);
+            g_.rest.add_contacts(model_, q, load_parameters, by_contact);
+        }
         if (dof_map.has_values() || g_.rest.asked) {
             // Assembles again, because the factorization has rotated the blocks of rotated nodes.
             model_.assemble(q, load_parameters, false);
             model_.assemble_forces(load_parameters);
             const VectorXd reaction = product(lambda, *proximal.weights) + by_q;
-            g_.rest.add_prescribed(dof_map, reaction);
+            const VectorXd gradient = newton_.gradient(q, proximal);
+            g_.rest.add_constrained(dof_map, reaction, lambda, gradient, by_motor_forces);
             if (dof_map.has_values())
-                dof_map.vjp(reaction, lambda, newton_.gradient(q, proximal), load_parameters, scene_,
-                            by_motor_forces);
+                dof_map.vjp(reaction, lambda, gradient, load_parameters, scene_, by_motor_forces);
         }
         model_.parameters().time_varying().move_gradient(scene_);
         add_by_load_parameters(step, fraction, scene_.load_parameters);

@@ -207,12 +207,12 @@ PrescribedTangent MotionDerivatives::prescribed(const StageTangent& stage, const
     const DofMap& dof_map = model_.dof_map();
     const bool changes = values_change_ || !stage.tangent.isZero(0.0);
     if (!changes || !(dof_map.has_values() || reshapes_)) return {};
-    const bool joints = dof_map.has_reduced_coordinates() && values_change_;
+    const bool joints = dof_map.has_reduced_coordinates() && (values_change_ || reshapes_);
     const auto target = [&](double t) {
         const LoadParameters at = stage.load_parameters + t * stage.tangent;
-        const Model& there = set(t, at);
+        Model& there = set(t, at);
         if (!joints) return there.dof_map().prescribed_increment(q, at);
-        const StateOnJoints carried = state_on_joints(model_, q, at, gradient);
+        const StateOnJoints carried = state_on_joints(there, q, at, gradient);
         return joined({carried.moved, carried.driven, carried.forces});
     };
     const Index n = q.size();

@@ -19,6 +19,15 @@ struct RestGradient {
     void add(Model& model, const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& lambda) {
         if (asked) add_rest_vjp(model, q, load_parameters, lambda, by_nodes);
     }
+    /// Adds - lambda . df/dX of forces without an energy at the last evaluated state.
+    void add_forces(Model& model, const VectorXd& lambda) {
+        if (asked) add_rest_forces_vjp(model, lambda, by_nodes);
+    }
+    /// Adds lambda . dg/dX of the contact forces, with friction, alone.
+    void add_contacts(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                      const VectorXd& lambda) {
+        if (asked) model.contacts().add_rest_vjp(q, load_parameters, lambda, by_nodes);
+    }
     /// Adds that of the strains times stresses at the last evaluated state.
     void add_strains(const ViscousTerms& terms, const StrainSet& stresses) {
         if (asked && !stresses.empty()) add_rest_strains_vjp(terms, stresses, by_nodes);
@@ -28,9 +37,13 @@ struct RestGradient {
         const Index first = model.nodes().n_coordinates(), count = by_nodes.size() - first;
         by_nodes.tail(count) += by_q.segment(first, count);
     }
-    /// Adds the part of a gradient by all dofs that is by prescribed ones.
-    void add_prescribed(const DofMap& dof_map, const VectorXd& by_q) {
-        if (asked) by_prescribed += by_q - dof_map.expand(dof_map.vector(by_q));
+    /// Adds the part of a gradient by all dofs that is by those that supports prescribe, and by those that ties and rigid bodies move.
+    /// Arguments as in DofMap::vjp.
+    void add_constrained(const DofMap& dof_map, const VectorXd& by_q, const VectorXd& lambda,
+                         const VectorXd& gradient, const VectorXd& by_motor_forces = {}) {
+        if (!asked) return;
+        by_prescribed += by_q - dof_map.expand(dof_map.vector(by_q));
+        dof_map.rest_vjp(by_q, lambda, gradient, by_motor_forces, by_nodes);
     }
 };
 

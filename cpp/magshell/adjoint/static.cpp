@@ -40,8 +40,9 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     if (dof_map.has_values() || rest.asked) add_product(lambda, by_q);
     if (rest.asked) {
         rest.clear(model);
-        rest.add(model, q, load_parameters, lambda);
-        rest.add_prescribed(dof_map, by_q);
+        rest.add(model, q, load_parameters, lambda + motors);
+        rest.add_constrained(dof_map, by_q, lambda, model.residual().gradient,
+                             has_motor_gradient ? by_motor_forces : VectorXd());
     }
     if (dof_map.has_values()) {
         dof_map.vjp(by_q, lambda, model.residual().gradient, load_parameters, gradient,

@@ -50,6 +50,7 @@ class BroadPhase {
     const std::optional<NeighbourPair>& nearest_neighbours(Index contact) const { return nearest_[contact]; }
 
     const std::vector<ContactSurface>& surfaces() const { return surfaces_; }
+    const std::vector<SurfacePair>& contacts() const { return contacts_; }
 
     /// Returns the pairs nearer than the `margins` of each contact [m] with nodes at q, and the overcount
     /// corrections. Pairs that share a node are left out, here and below.

@@ -141,19 +141,28 @@ void PairEnergy::add_parallel(bool project_psd, PairBlocks& blocks) const {
         }
 }
 
-PairEnergy::ByLaw PairEnergy::vjp(const PairVectors& lambda, double by_normal_force) const {
-    double along = 0.0, turning = 0.0;
-    for (int i = 0; i < nodes_of(pair_.kind); ++i) along += near_.weights[i] * near_.normal.dot(lambda[i]);
-    along -= by_normal_force;  // N = - A k m b'
+PairEnergy::Rates PairEnergy::rates(const PairVectors& lambda, double by_normal_force) const {
+    Rates rates;
+    for (int i = 0; i < nodes_of(pair_.kind); ++i)
+        rates.distance += near_.weights[i] * near_.normal.dot(lambda[i]);
+    rates.distance -= by_normal_force;  // N = - A k m b'
     if (edges_.acts)
-        turning = edges_.slope *
-                  (edges_.by_one.dot(lambda[1] - lambda[0]) + edges_.by_two.dot(lambda[3] - lambda[2]));
-    along *= edges_.factor;
+        rates.parallel = edges_.by_one.dot(lambda[1] - lambda[0]) + edges_.by_two.dot(lambda[3] - lambda[2]);
+    return rates;
+}
+
+PairEnergy::ByLaw PairEnergy::vjp_of_own_law(const Rates& rates) const {
+    const double along = edges_.factor * rates.distance,
+                 turning = edges_.acts ? edges_.slope * rates.parallel : 0.0;
     const double area = pair_.area, scale = area * law_.stiffness;
-    ByLaw by{area * (along * barrier_.slope + turning * barrier_.energy),
-             scale * (along * barrier_.slope_by_reach + turning * barrier_.energy_by_reach),
-             -scale * (along * barrier_.curvature + turning * barrier_.slope),
-             scale * (along * barrier_.slope_by_smoothing + turning * barrier_.energy_by_smoothing)};
+    return {area * (along * barrier_.slope + turning * barrier_.energy),
+            scale * (along * barrier_.slope_by_reach + turning * barrier_.energy_by_reach),
+            -scale * (along * barrier_.curvature + turning * barrier_.slope),
+            scale * (along * barrier_.slope_by_smoothing + turning * barrier_.energy_by_smoothing)};
+}
+
+PairEnergy::ByLaw PairEnergy::vjp(const PairVectors& lambda, double by_normal_force) const {
+    ByLaw by = vjp_of_own_law(rates(lambda, by_normal_force));
     if (distance_scale_ < 1.0) {
         // The pair's own distances are those of the law times room / (activation distance + minimum
         // separation).
@@ -165,6 +174,24 @@ PairEnergy::ByLaw PairEnergy::vjp(const PairVectors& lambda, double by_normal_fo
         by.smoothing *= distance_scale_;
     }
     return by;
+}
+
+// The energy is proportional to the area. With y = c/e, m = (2 - y) y has dm/de = - 2 (1 - y) y/e, and m' = 2 (1 - y)/e has
+// dm'/de = (4 y - 2)/e^2.
+PairEnergy::ByPair PairEnergy::pair_vjp(const PairVectors& lambda, double by_normal_force) const {
+    const Rates along = rates(lambda, by_normal_force);
+    const ByLaw by = vjp_of_own_law(along);
+    ByPair of;
+    of.area = by.stiffness * law_.stiffness / pair_.area;
+    if (edges_.acts) {
+        const double e = pair_.parallel, y = edges_.area * edges_.area / e;
+        of.parallel = slope_ * along.distance * (-2.0 * (1.0 - y) * y / e) +
+                      energy_ * along.parallel * (4.0 * y - 2.0) / (e * e);
+    }
+    if (distance_scale_ < 1.0)
+        of.room = (by.reach * law_.reach + by.thickness * law_.thickness + by.smoothing * law_.smoothing) /
+                  pair_.room;
+    return of;
 }
 
 }  // namespace magshell

@@ -84,8 +84,21 @@ class PairEnergy {
     };
     ByLaw vjp(const PairVectors& lambda, double by_normal_force = 0.0) const;
 
+    /// The gradient of the same by the numbers of the pair: area, parallel and room.
+    struct ByPair {
+        double area = 0.0, parallel = 0.0, room = 0.0;
+    };
+    ByPair pair_vjp(const PairVectors& lambda, double by_normal_force = 0.0) const;
+
   private:
     void add_parallel(bool project_psd, PairBlocks& blocks) const;
+    /// The rates along lambda of the distance d, to which a change of the normal force counts as well, and of c in contact/parallel_edges.h.
+    struct Rates {
+        double distance = 0.0, parallel = 0.0;
+    };
+    Rates rates(const PairVectors& lambda, double by_normal_force) const;
+    /// Returns the gradient by the scaled law of the pair.
+    ByLaw vjp_of_own_law(const Rates& rates) const;
 
     ContactPair pair_;
     double distance_scale_;

@@ -296,6 +296,19 @@ void DofMap::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorX
     }
 }
 
+void DofMap::rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                      const VectorXd& by_motor_forces, VectorXd& by_nodes) const {
+    if (!reduced_) return;
+    reduced_->rest_vjp(by_state, lambda, gradient, by_motor_forces, by_nodes);
+    const LinearTies* ties = ties_of(reduced_);
+    if (!ties) return;
+    const Frames frames{frame_of_, held_};
+    VectorXd by_rest = VectorXd::Zero(full_size_);
+    ties->add_rest_gradient(frames.into(by_state), by_rest);
+    frames.out_of(by_rest);
+    by_nodes += by_rest.head(by_nodes.size());
+}
+
 double DofMap::largest_rotation() const {
     double turn = 0.0;
     for (const SupportMove& move : moves_) turn = std::max(turn, move.rotation_vector.norm());
@@ -503,8 +516,8 @@ void DofMap::project_state(VectorXd& q, VectorXd* v) const {
 }
 
 void DofMap::project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                               Gradient& out) const {
-    if (reduced_) reduced_->project_state_vjp(q, v, by_q, by_v, out);
+                               Gradient& out, VectorXd* by_rest) const {
+    if (reduced_) reduced_->project_state_vjp(q, v, by_q, by_v, out, by_rest);
 }
 
 }  // namespace magshell

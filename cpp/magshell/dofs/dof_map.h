@@ -75,6 +75,10 @@ class DofMap {
     void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
              const LoadParameters& load_parameters, Gradient& out,
              const VectorXd& by_motor_forces = {}) const;
+    /// Adds the gradient by the rest positions of nodes that ties of displacements or rigid bodies move, three numbers per node; arguments
+    /// as in vjp.
+    void rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                  const VectorXd& by_motor_forces, VectorXd& by_nodes) const;
     /// Adds to the forces K p of a prescribed increment those due to the curved paths of motor-driven nodes.
     void add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const;
     /// Returns the forces [N] and moments [N m] of the motors, one after another, for a gradient of the energy.
@@ -130,7 +134,7 @@ class DofMap {
     /// See ReducedCoordinates: make a start consistent, and the adjoint of that.
     void project_state(VectorXd& q, VectorXd* v) const;
     void project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                           Gradient& out) const;
+                           Gradient& out, VectorXd* by_rest) const;
     /// Selects from points of all dofs those of the free ones.
     std::vector<Vec3> free(const std::vector<Vec3>& full) const;
     /// Returns a vector of all dofs from a free one: zero where prescribed, B z for reduced coordinates.

@@ -33,6 +33,14 @@ void LinearTies::extend(VectorXd& motion) const {
     }
 }
 
+// x_s = X_s + sum_j w_j (x_j - X_j) + ...
+void LinearTies::add_rest_gradient(const VectorXd& by_dofs, VectorXd& out) const {
+    for (const TiedDof& each : tied_) {
+        out[each.dof] += by_dofs[each.dof];
+        for (const TiedDof::Part& part : each.parts) out[part.dof] -= part.weight * by_dofs[each.dof];
+    }
+}
+
 void LinearTies::gather(VectorXd& forces) const {
     for (const TiedDof& each : tied_)
         for (const TiedDof::Part& part : each.parts) forces[part.dof] += part.weight * forces[each.dof];

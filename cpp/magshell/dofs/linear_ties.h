@@ -44,6 +44,8 @@ class LinearTies : public ReducedCoordinates {
 
     /// Sets the tied dofs of a motion from the others.
     void extend(VectorXd& motion) const;
+    /// Adds the gradient by the displacements' origins, the positions of all dofs at rest, from that by the dofs.
+    void add_rest_gradient(const VectorXd& by_dofs, VectorXd& out) const;
     /// Adds the forces on tied dofs to all dofs that they follow, or to the free ones alone.
     void gather(VectorXd& forces) const;
     void gather(const VectorXd& forces, VectorXd& reduced) const;
@@ -70,8 +72,8 @@ class LinearTies : public ReducedCoordinates {
     Eigen::MatrixXd curvature(const VectorXd&, const VectorXd&) const override { return {}; }
     void retract(VectorXd&, const VectorXd&) const override {}
     void project_state(VectorXd&, VectorXd*) const override {}
-    void project_state_vjp(const VectorXd&, const VectorXd&, VectorXd&, VectorXd&, Gradient&) const override {
-    }
+    void project_state_vjp(const VectorXd&, const VectorXd&, VectorXd&, VectorXd&, Gradient&,
+                           VectorXd*) const override {}
     VectorXd rounding(const VectorXd&) const override { return {}; }
 
   private:

@@ -300,6 +300,23 @@ void ReducedAssembly::add_motor_force_change(const VectorXd& gradient, const Vec
     }
 }
 
+VectorXd ReducedAssembly::adjoint_rates(const System& system, const VectorXd& lambda,
+                                        const VectorXd& by_motor_forces, Index& first) const {
+    const Index n = system.map->coordinates(), m = system.map->n_motor_coordinates();
+    VectorXd z = VectorXd::Zero(n + m);
+    if (n > 0) z.head(n) = free_part(system, lambda);
+    if (by_motor_forces.size() > 0 && m > 0) z.tail(m) = motor_rates(system, by_motor_forces, first);
+    return z;
+}
+
+void ReducedAssembly::rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                               const VectorXd& by_motor_forces, VectorXd& by_nodes) const {
+    Index first = 0;
+    for (const System& system : systems_)
+        system.map->rest_vjp(at_, by_state, adjoint_rates(system, lambda, by_motor_forces, first), gradient,
+                             by_nodes);
+}
+
 void ReducedAssembly::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
                           const VectorXd& by_motor_forces, Gradient& out) const {
     Index first = 0;
@@ -307,9 +324,7 @@ void ReducedAssembly::vjp(const VectorXd& by_state, const VectorXd& lambda, cons
         const ReducedCoordinates& map = *system.map;
         const Index n = map.coordinates(), m = map.n_motor_coordinates();
         if (m == 0 && !map.has_joint_parameters()) continue;
-        VectorXd z = VectorXd::Zero(n + m);
-        if (n > 0) z.head(n) = free_part(system, lambda);
-        if (by_motor_forces.size() > 0 && m > 0) z.tail(m) = motor_rates(system, by_motor_forces, first);
+        const VectorXd z = adjoint_rates(system, lambda, by_motor_forces, first);
         map.joint_parameters_vjp(at_, by_state, z, gradient, out);
         if (m == 0) continue;
         VectorXd by_motors = motor_rows(system, map.gather(by_state));
@@ -409,8 +424,8 @@ void ReducedAssembly::project_state(VectorXd& q, VectorXd* v) const {
 }
 
 void ReducedAssembly::project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                                        Gradient& out) const {
-    for (const System& system : systems_) system.map->project_state_vjp(q, v, by_q, by_v, out);
+                                        Gradient& out, VectorXd* by_rest) const {
+    for (const System& system : systems_) system.map->project_state_vjp(q, v, by_q, by_v, out, by_rest);
 }
 
 void ReducedAssembly::append_points(const std::vector<Vec3>& full, std::vector<Vec3>& points) const {

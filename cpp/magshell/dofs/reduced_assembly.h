@@ -65,6 +65,9 @@ class ReducedAssembly {
     /// an adjoint lambda of all dofs under a gradient g of the energy.
     void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
              const VectorXd& by_motor_forces, Gradient& out) const;
+    /// Adds the gradient by rest positions of vertices that are carried along, three numbers per node; arguments as in vjp.
+    void rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
+                  const VectorXd& by_motor_forces, VectorXd& by_nodes) const;
     /// Returns the forces [N] and moments [N m] of the motors for a gradient of the energy.
     VectorXd motor_forces(const VectorXd& gradient) const;
     /// Returns the motion B z of all nodes along the motors at which the power of motor_forces(g) is the weighted sum `by_motor_forces`.
@@ -95,7 +98,7 @@ class ReducedAssembly {
     VectorXd rounding(const VectorXd& q) const;
     void project_state(VectorXd& q, VectorXd* v) const;
     void project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                           Gradient& out) const;
+                           Gradient& out, VectorXd* by_rest) const;
 
     /// Appends a point for each coordinate: the mean of the nodes that it moves.
     void append_points(const std::vector<Vec3>& full, std::vector<Vec3>& points) const;
@@ -130,6 +133,10 @@ class ReducedAssembly {
     void add_forces_of(const System& system, const VectorXd& by_coordinates, VectorXd& forces) const;
     /// Returns the coordinate rates [m] of the motors of a system, from numbers for all motors in their own units; moves `first` to the next system.
     static VectorXd motor_rates(const System& system, const VectorXd& all, Index& first);
+    /// Returns the rates of all coordinates of a system in the motion lambda, those of motors from the gradient by their forces. `first` as
+    /// in motor_rates.
+    VectorXd adjoint_rates(const System& system, const VectorXd& lambda, const VectorXd& by_motor_forces,
+                           Index& first) const;
     VectorXd pull_back_free(const System& system, const VectorXd& rows) const;
     void add_lower(const System& system, const Eigen::MatrixXd& block, double* values) const;
 

@@ -57,6 +57,10 @@ class ReducedCoordinates {
                                       const VectorXd& /*z*/, const VectorXd& /*gradient*/,
                                       Gradient& /*out*/) const {}
 
+    /// Adds to `by_nodes`, three numbers per node, the gradient of the same by the rest positions of vertices that are carried along.
+    virtual void rest_vjp(const VectorXd& /*q*/, const VectorXd& /*by_state*/, const VectorXd& /*z*/,
+                          const VectorXd& /*gradient*/, VectorXd& /*by_nodes*/) const {}
+
     /// Returns the rigid bodies that no joint holds.
     virtual std::vector<const RigidNodes*> free_bodies() const { return {}; }
 
@@ -68,9 +72,9 @@ class ReducedCoordinates {
     virtual void project_state(VectorXd& q, VectorXd* v) const = 0;
 
     /// Transforms gradients by the result of project_state, at q after it, to those by its arguments and by parameters; v and by_v may
-    /// be empty.
+    /// be empty. by_rest: the gradient by rest positions, as in rest_vjp; nullptr if it is not asked for.
     virtual void project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                                   Gradient& out) const = 0;
+                                   Gradient& out, VectorXd* by_rest) const = 0;
 
     /// Returns the displacement of each node at q due to round-off of the coordinates that are computed from nodes [m], over the machine epsilon.
     /// With long arms it exceeds the round-off of the nodes' own coordinates.

@@ -307,7 +307,7 @@ void SkeletonCoordinates::project_state(VectorXd& q, VectorXd* v) const {
 // With B_l and v_l the rows of the leading nodes, project_state() returns v = B z with z = B_l^+ v_l (pseudoinverse). B depends on the pose;
 // its derivative is d2x/dz2.
 void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q,
-                                            VectorXd& by_v, Gradient& out) const {
+                                            VectorXd& by_v, Gradient& out, VectorXd* by_rest) const {
     const MatrixXd b = jacobian(q), led = leading(b);
     const auto inverse = solver_of(MatrixXd(led.transpose() * led));
     VectorXd by_pose = b.transpose() * gather(by_q);
@@ -330,6 +330,7 @@ void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v
         scatter(given, by_q);
     }
     joint_parameters_vjp(q, by_state, rates, apart, out);
+    if (by_rest) rest_vjp(q, by_state, rates, apart, *by_rest);
 }
 
 // Motors of joints: the distance of their coordinates from the targets, and the gradients by the targets.
@@ -438,11 +439,23 @@ void SkeletonCoordinates::Beyond::add(const Beyond& later) {
     moment += later.moment + (later.center - center).cross(later.force);
 }
 
+std::vector<Vec3> SkeletonCoordinates::turning_rates(const VectorXd& z,
+                                                     const std::vector<JointColumn>& columns) const {
+    std::vector<Vec3> rates(n_links(), Vec3::Zero());
+    for (Index k = 0; k < n_links(); ++k) {
+        if (joints_[k].parent >= 0) rates[k] = rates[joints_[k].parent];
+        for (Index j = first_[k]; j < first_[k] + joints_[k].freedom(); ++j)
+            if (columns[j].turns) rates[k] += columns[j].scale * z[column_of_[j]] * columns[j].axis;
+    }
+    return rates;
+}
+
 std::vector<SkeletonCoordinates::Beyond> SkeletonCoordinates::beyond(
     const VectorXd& q, const VectorXd& by_state, const VectorXd& z, const VectorXd& gradient,
     const std::vector<Pose>& poses, const std::vector<JointColumn>& columns) const {
     const VectorXd motion = twists(q).motion(z);
-    const std::vector<Vec3> moments = ball_moments(q, gradient, z, columns);
+    const std::vector<Vec3> moments = ball_moments(q, gradient, z, columns),
+                            rates = turning_rates(z, columns);
     std::vector<Beyond> all(n_links());
     for (Index k = 0; k < n_links(); ++k) {
         Beyond& own = all[k];
@@ -451,9 +464,7 @@ std::vector<SkeletonCoordinates::Beyond> SkeletonCoordinates::beyond(
         own.twist = -moments[k];
         for (Index n = row_[k]; n < row_[k] + RigidNodes::corners; ++n)
             own.velocity += motion.segment<3>(3 * n) / RigidNodes::corners;
-        if (joints_[k].parent >= 0) own.rate = all[joints_[k].parent].rate;
-        for (Index j = first_[k]; j < first_[k] + joints_[k].freedom(); ++j)
-            if (columns[j].turns) own.rate += columns[j].scale * z[column_of_[j]] * columns[j].axis;
+        own.rate = rates[k];
         for (Index n = 0; n < links_[k].size(); ++n) {
             const Index node = links_[k].nodes()[n];
             const Vec3 arm = q.segment<3>(3 * node) - own.center, s = by_state.segment<3>(3 * node),
@@ -514,6 +525,19 @@ void SkeletonCoordinates::joint_parameters_vjp(const VectorXd& q, const VectorXd
                 by_point(frame(k, poses), parent_rate) - by_point(poses[k].rotation, sums[k].rate);
         add_own_gradients(k, sums[k], parent_rate, z, poses, columns, out);
     }
+}
+
+// The vertices of a link are at x = c + R (X - C), C the center at rest, and move by v + w x (x - c):  dx = R dX,  d(B z) = w x R dX.
+void SkeletonCoordinates::rest_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
+                                   const VectorXd& gradient, VectorXd& by_nodes) const {
+    const std::vector<Pose> poses = this->poses(q);
+    const std::vector<Vec3> rates = turning_rates(z, columns(poses));
+    for (Index k = 0; k < n_links(); ++k)
+        for (Index n = links_[k].own(); n < links_[k].size(); ++n) {
+            const Index first = 3 * links_[k].nodes()[n];
+            const Vec3 by_position = by_state.segment<3>(first) + gradient.segment<3>(first).cross(rates[k]);
+            by_nodes.segment<3>(first) += poses[k].rotation.transpose() * by_position;
+        }
 }
 
 }  // namespace magshell

@@ -46,6 +46,8 @@ class SkeletonCoordinates final : public ReducedCoordinates {
     bool has_joint_parameters() const override;
     void joint_parameters_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
                               const VectorXd& gradient, Gradient& out) const override;
+    void rest_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z, const VectorXd& gradient,
+                  VectorXd& by_nodes) const override;
     std::vector<const RigidNodes*> free_bodies() const override;
     LinkTwists twists(const VectorXd& q) const override;
     Eigen::MatrixXd curvature(const VectorXd& q, const VectorXd& gradient) const override;
@@ -53,7 +55,7 @@ class SkeletonCoordinates final : public ReducedCoordinates {
     VectorXd rounding(const VectorXd& q) const override;
     void project_state(VectorXd& q, VectorXd* v) const override;
     void project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                           Gradient& out) const override;
+                           Gradient& out, VectorXd* by_rest) const override;
 
   private:
     using Pose = RigidNodes::Pose;
@@ -86,6 +88,8 @@ class SkeletonCoordinates final : public ReducedCoordinates {
         /// Adds the sums of a later link, converted to c and v of this one.
         void add(const Beyond& later);
     };
+    /// Returns the angular velocity of each link in the motion B z.
+    std::vector<Vec3> turning_rates(const VectorXd& z, const std::vector<JointColumn>& columns) const;
     /// Returns these sums for every link.
     std::vector<Beyond> beyond(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
                                const VectorXd& gradient, const std::vector<Pose>& poses,

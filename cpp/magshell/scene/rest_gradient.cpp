@@ -1,14 +1,19 @@
 #include "magshell/scene/rest_gradient.h"
 
 #include "magshell/energy/surface_tension.h"
+#include "magshell/terms/contact/body_friction_term.h"
 #include "magshell/terms/contact/contact_term.h"
 #include "magshell/terms/contact/friction_term.h"
+#include "magshell/terms/joint/torque_term.h"
+#include "magshell/terms/load/body_force_term.h"
 #include "magshell/terms/load/edge_moment_term.h"
 #include "magshell/terms/load/face_energy.h"
 #include "magshell/terms/load/group_energy_term.h"
 #include "magshell/terms/load/load_term.h"
 #include "magshell/terms/load/pressure_term.h"
+#include "magshell/terms/load/spring_term.h"
 #include "magshell/terms/load/water_term.h"
+#include "magshell/terms/magnetic/moment_term.h"
 #include "magshell/terms/rest_shape_term.h"
 
 namespace magshell {
@@ -27,8 +32,8 @@ bool rest_gradient_is_complete(const Term& term) {
         return shaped->has_rest_gradient();
     if (const auto* const moments = dynamic_cast<const EdgeMomentTerm*>(&term))
         return !moments->reads_rest_lengths();
-    return is_one_of<LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>, GroupEnergyTerm>(
-        term);
+    return is_one_of<LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>, GroupEnergyTerm,
+                     SpringTerm, MomentTerm, BodyForceTerm, TorqueTerm>(term);
 }
 
 }  // namespace
@@ -38,6 +43,10 @@ void add_rest_vjp(Model& model, const VectorXd& q, const LoadParameters& load_pa
     for (const std::unique_ptr<Term>& term : model.terms().energies)
         if (auto* const shaped = dynamic_cast<RestShapeTerm*>(term.get()))
             shaped->add_rest_vjp(q.data(), load_parameters, lambda.data(), out);
+}
+
+void add_rest_forces_vjp(const Model& model, const VectorXd& lambda, VectorXd& out) {
+    for (const std::unique_ptr<ForceTerm>& force : model.terms().forces) force->add_rest_vjp(lambda, out);
 }
 
 void add_rest_strains_vjp(const ViscousTerms& terms, const StrainSet& stresses, VectorXd& out) {
@@ -51,7 +60,7 @@ std::vector<std::string_view> without_rest_gradient(const Model& model) {
     for (const std::unique_ptr<Term>& term : model.terms().energies)
         if (!rest_gradient_is_complete(*term)) names.push_back(term->name());
     for (const std::unique_ptr<ForceTerm>& force : model.terms().forces)
-        if (!is_one_of<FrictionTerm, WaterTerm>(*force)) names.push_back(force->name());
+        if (!is_one_of<BodyFrictionTerm, FrictionTerm, WaterTerm>(*force)) names.push_back(force->name());
     return names;
 }
 

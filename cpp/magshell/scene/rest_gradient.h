@@ -18,6 +18,9 @@ namespace magshell {
 void add_rest_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
                   const VectorXd& lambda, VectorXd& out);
 
+/// Adds - lambda . df/dX of the forces that have no energy at the last evaluated state.
+void add_rest_forces_vjp(const Model& model, const VectorXd& lambda, VectorXd& out);
+
 /// Adds s . dd/dX of the strains d of all elastic terms at the last evaluated state.
 void add_rest_strains_vjp(const ViscousTerms& terms, const StrainSet& stresses, VectorXd& out);
 

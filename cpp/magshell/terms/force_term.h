@@ -62,6 +62,9 @@ class ForceTerm {
     virtual void vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
                      KinematicsGradient& by, Gradient& out) const = 0;
 
+    /// Adds - lambda . df/dX at the last evaluated state, three numbers per node, of a force that reads the rest shape of bodies.
+    virtual void add_rest_vjp(const VectorXd& /*lambda*/, VectorXd& /*out*/) const {}
+
     /// Freezes the quantities that make the force nonsymmetric (normal forces and normals) at their values of
     /// the last evaluated state, or releases them.
     virtual void set_frozen(bool /*frozen*/) {}

@@ -36,6 +36,12 @@ TendonTerm::Pull::Pull(const std::array<double, n_numbers>& numbers, double shar
     tension_by[3] = of_string * penalty.force_by_smoothing * share;
 }
 
+// The share enters as k/s, s r and s times the smoothing.
+double TendonTerm::Pull::tension_by_fraction(const std::array<double, n_numbers>& numbers,
+                                             double share) const {
+    return (-numbers[1] * tension_by[1] + numbers[2] * tension_by[2] + numbers[3] * tension_by[3]) / share;
+}
+
 TendonTerm::TendonTerm(const std::vector<TendonInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                        Registry& registry)
     : factor_(registry.load_parameters.add("scene", "load_factor", "1", 1, 1)) {
@@ -87,6 +93,7 @@ void TendonTerm::add_string(Index tendon, double share, const EmbeddedPoint* fir
                 segment.pairs.push_back(
                     matrix.node_slot(added.nodes[segment.places[i]], added.nodes[segment.places[j]]));
         segment.softening = softened * span.norm();
+        segment.at_rest = span;
     }
 }
 
@@ -197,6 +204,30 @@ void TendonTerm::vjp(const double*, const LoadParameters& load_parameters, const
         for (int k = 0; k < n_numbers; ++k)
             out.values[tendon.slots[k].at(0)] += factor * pull.tension_by[k] * along;
         out.load_parameters[factor_.first] += pull.tension * along;
+    }
+}
+
+// The shares are l_i / sum l of the lengths l_i of the segments at rest. Points keep their places in the matter, so their weights stay; the
+// caller adds what follows from the slack length and the smoothing.
+void TendonTerm::add_rest_vjp(const double*, const LoadParameters& load_parameters, const double* lambda,
+                              VectorXd& out) {
+    const double factor = load_parameters[factor_.first];
+    std::vector<double> lengths(tendons_.size(), 0.0), means(tendons_.size(), 0.0), by_shares;
+    for (const String& each : strings_) {
+        const Tendon& tendon = tendons_[each.tendon];
+        const Pull pull(tendon.numbers, each.share, each.length);
+        by_shares.push_back(factor * pull.tension_by_fraction(tendon.numbers, each.share) *
+                            each.along(lambda));
+        means[each.tendon] += each.share * by_shares.back();
+        for (const Segment& segment : each.segments) lengths[each.tendon] += segment.at_rest.norm();
+    }
+    for (std::size_t s = 0; s < strings_.size(); ++s) {
+        const String& each = strings_[s];
+        const double by_length = (by_shares[s] - means[each.tendon]) / lengths[each.tendon];
+        for (const Segment& segment : each.segments)
+            for (std::size_t k = 0; k < segment.places.size(); ++k)
+                out.segment<3>(3 * each.nodes[segment.places[k]]) +=
+                    by_length * segment.weights[k] * segment.at_rest.normalized();
     }
 }
 

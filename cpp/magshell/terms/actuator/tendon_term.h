@@ -14,6 +14,7 @@
 
 #include "magshell/body/nodes.h"
 #include "magshell/terms/low_rank_term.h"
+#include "magshell/terms/rest_shape_term.h"
 
 namespace magshell {
 
@@ -32,7 +33,7 @@ struct TendonInput {
     std::vector<double> shares;
 };
 
-class TendonTerm final : public LowRankTerm {
+class TendonTerm final : public LowRankTerm, public RestShapeTerm {
   public:
     TendonTerm(const std::vector<TendonInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                Registry& registry);
@@ -48,6 +49,8 @@ class TendonTerm final : public LowRankTerm {
     void add_cancelling_here(VectorXd& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void add_rest_vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                      VectorXd& out) override;
     std::size_t bytes() const override;
 
   private:
@@ -56,6 +59,7 @@ class TendonTerm final : public LowRankTerm {
         std::vector<double> weights;            // weights of these nodes in x_b - x_a
         std::vector<SystemMatrix::Slot> pairs;  // at lower_index(row - 1, column)
         double softening;                       // [m] length below which the segment's length is smoothed
+        Vec3 at_rest;                           // [m] x_b - x_a at rest
     };
     struct String {
         Index tendon;
@@ -79,6 +83,8 @@ class TendonTerm final : public LowRankTerm {
     struct Pull {
         double energy, tension, stiffness = 0.0;
         std::array<double, n_numbers> tension_by{};
+        /// Returns the derivative of dE/dL by the share, with the numbers of the tendon.
+        double tension_by_fraction(const std::array<double, n_numbers>& numbers, double share) const;
         Pull(const std::array<double, n_numbers>& numbers, double share, double length);
     };
 

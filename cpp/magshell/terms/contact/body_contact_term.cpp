@@ -21,7 +21,8 @@ constexpr double remaining_gap = 0.1;
 BodyContactTerm::BodyContactTerm(const Nodes& nodes, const std::vector<ContactSurfaceInput>& surfaces,
                                  const std::vector<BodyContactInput>& contacts, ContactLayer& layer,
                                  Registry& registry)
-    : laws_(contacts.size()),
+    : nodes_(nodes),
+      laws_(contacts.size()),
       stiffness_(contacts.size(), 0.0),
       friction_(contacts.size()),
       least_(contacts.size(), 0.0),
@@ -240,6 +241,14 @@ void BodyContactTerm::finish_assembly(const double*, const LoadParameters&, Syst
 void BodyContactTerm::vjp(const double*, const LoadParameters&, const double* lambda, Gradient& out) {
     for (const ActiveContact& active : evaluated_contacts())
         add_vjp(active, active.at.vjp(positions_of(active.near.pair, lambda)), {}, factor_, out.values);
+}
+
+void BodyContactTerm::add_rest_vjp(const double*, const LoadParameters&, const double* lambda,
+                                   VectorXd& out) {
+    ContactRest by_rest = rest_gradient();
+    for (const ActiveContact& active : evaluated_contacts())
+        by_rest.add(active.near, active.at.pair_vjp(positions_of(active.near.pair, lambda)));
+    by_rest.add_to(out);
 }
 
 void BodyContactTerm::add_vjp(const ActiveContact& active, const PairEnergy::ByLaw& by,

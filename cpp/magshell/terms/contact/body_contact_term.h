@@ -14,15 +14,16 @@
 #include <vector>
 
 #include "magshell/assembly/contact_layer.h"
-#include "magshell/contact/pair_energy.h"
+#include "magshell/contact/contact_rest.h"
 #include "magshell/force/friction.h"
 #include "magshell/terms/contact/contact_candidates.h"
 #include "magshell/terms/contact/pair_stiffness.h"
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/term.h"
 
 namespace magshell {
 
-class BodyContactTerm final : public Term {
+class BodyContactTerm final : public Term, public RestShapeTerm {
   public:
     /// A pair closer than its activation distance.
     struct ActiveContact {
@@ -120,6 +121,10 @@ class BodyContactTerm final : public Term {
                          SystemMatrix& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void add_rest_vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                      VectorXd& out) override;
+    /// Returns what adds up the gradient by rest positions from that of each pair.
+    ContactRest rest_gradient() const { return {candidates_.phase(), nodes_.rest}; }
     std::size_t bytes() const override;
 
   private:
@@ -146,6 +151,7 @@ class BodyContactTerm final : public Term {
     template <class Found>
     void each_limit(const double* q, const double* p, const Found& found) const;
 
+    const Nodes& nodes_;
     std::vector<ParameterSlices> slices_;
     std::vector<BarrierLaw> laws_;  // with the stiffness times factor_
     double factor_ = 1.0;

@@ -1,6 +1,12 @@
 #include "magshell/terms/contact/body_friction_term.h"
 
 namespace magshell {
+namespace {
+
+// The motion of a pair for derivatives by the normal force alone.
+const PairVectors no_motion = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+
+}  // namespace
 
 void BodyFrictionTerm::begin_step(const VectorXd& q, const LoadParameters&) {
     if (contacts_.begin_step([&] { return contact_.active_contacts(q.data()); }))
@@ -60,12 +66,22 @@ void BodyFrictionTerm::vjp(const Kinematics&, const LoadParameters&, const Vecto
             by.velocity.segment<3>(first) += of.by_velocity[k];
             if (each.lagged) by.begin.segment<3>(first) += of.by_position[k];
         }
-        const PairVectors none = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
         contact_.add_vjp(
-            active, active.at.vjp(none, -of.by_normal_force),
+            active, active.at.vjp(no_motion, -of.by_normal_force),
             {-each.factor * of.by_law.kinetic, -each.factor * of.by_law.fixed, -of.by_law.sticking_speed},
             each.lagged ? 1.0 : contact_.factor(), out.values);
     }
+}
+
+// The force depends on the rest shape through the normal forces alone.
+void BodyFrictionTerm::add_rest_vjp(const VectorXd& lambda, VectorXd& out) const {
+    ContactRest by_rest = contact_.rest_gradient();
+    for (const FrictionContact& each : friction_contacts_) {
+        const ActiveContact& active = *each.active;
+        const PairFriction::Gradient of = each.friction.vjp(positions_of(active.near.pair, lambda.data()));
+        by_rest.add(active.near, active.at.pair_vjp(no_motion, -of.by_normal_force));
+    }
+    by_rest.add_to(out);
 }
 
 void BodyFrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {

@@ -63,6 +63,7 @@ class ContactCandidates {
     /// Returns the largest displacement [m] of a node that one step may have. Longer paths would meet nearly
     /// every other face.
     double max_displacement() const { return max_displacement_; }
+    const BroadPhase& phase() const { return phase_; }
     /// Names the two faces of a pair.
     std::string describe(const NearPair& pair) const;
     std::size_t bytes() const;

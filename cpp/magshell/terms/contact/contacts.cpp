@@ -34,6 +34,12 @@ void Contacts::vjp(const VectorXd& q, const Kinematics& at, const LoadParameters
     for (const ForceTerm* friction : frictions_) friction->vjp(at, load_parameters, lambda, by, out);
 }
 
+void Contacts::add_rest_vjp(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& lambda,
+                            VectorXd& out) const {
+    if (bodies_) bodies_->add_rest_vjp(q.data(), load_parameters, lambda.data(), out);
+    for (const ForceTerm* friction : frictions_) friction->add_rest_vjp(lambda, out);
+}
+
 double Contacts::energy(const VectorXd& q, const LoadParameters& load_parameters) const {
     return (obstacles_ ? obstacles_->energy(q.data(), load_parameters) : 0.0) +
            (bodies_ ? bodies_->energy(q.data(), load_parameters) : 0.0);

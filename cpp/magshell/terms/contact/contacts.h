@@ -35,6 +35,10 @@ class Contacts {
     void vjp(const VectorXd& q, const Kinematics& at, const LoadParameters& load_parameters,
              const VectorXd& lambda, KinematicsGradient& by, Gradient& out) const;
 
+    /// Adds what their add_rest_vjp() add at that state.
+    void add_rest_vjp(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& lambda,
+                      VectorXd& out) const;
+
     /// Returns the points in contact with obstacles at the last evaluated state; with q, those at q.
     std::vector<ObstaclePoint> obstacle_points() const;
     std::vector<ObstaclePoint> obstacle_points(const VectorXd& q,

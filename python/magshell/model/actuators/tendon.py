@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..._input.quantity import quantity
+from ..._runtime.frozen import variant
 from ..bodies.bodies import BODIES, Bodies, on_body
-from ..bodies.embedded_points import embed_points
+from ..bodies.embedded_points import embed_points, embedded_in, moved_with
 from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
@@ -19,9 +20,11 @@ from .actuator_results import TendonResult
 if TYPE_CHECKING:
     from ..._input.kinds import Computed, Numbers
     from ..rigid.equimomental_points import RigidBodyPoints
+    from ..scene.values import Gradient
 
 
 _SMOOTHING = 1e-3  # [-] default smoothing over the length at rest
+_OF_LENGTH = {"rest_length": 1.0, "smoothing": _SMOOTHING}  # [-] defaults over the length at rest
 _KINDS = (*BODIES, RigidBody)
 
 
@@ -77,7 +80,7 @@ class Tendon(Actuator):
             raise ValueError(f"sliding must be True or False, got {sliding!r:.60}")
         self.sliding = sliding
         self.bodies: tuple[Any, ...] = tuple({id(each): each for each, _ in self._points}.values())
-        lengths = np.linalg.norm(np.diff([point for _, point in self._points], axis=0), axis=1)
+        lengths = self._lengths
         length = float(lengths.sum())
         if not lengths.min() > 1e-9 * length:
             raise ValueError(
@@ -90,6 +93,14 @@ class Tendon(Actuator):
         self.rest_length: np.ndarray = number("rest_length", "m", rest, 0.0, above=True)
         smooth = _SMOOTHING * length if smoothing is None else smoothing
         self.smoothing: np.ndarray = number("smoothing", "m", smooth, 0.0, above=True)
+        given = {"rest_length": rest_length, "smoothing": smoothing}
+        # the values that follow from its length at rest
+        self._follows: tuple[str, ...] = tuple(name for name, value in given.items() if value is None)
+
+    @property
+    def _lengths(self) -> np.ndarray:
+        """The lengths of its segments at rest, m."""
+        return np.linalg.norm(np.diff(self.points, axis=0), axis=1)
 
     @property
     def _is_spring(self) -> bool:
@@ -109,7 +120,38 @@ class Tendon(Actuator):
     def replaced(self, **values: Any) -> Tendon:
         """Returns the same tendon with other numbers."""
         now = {name: getattr(self, name) for name in self._replaceable} | values
-        return self._check_shapes(Tendon(self._points, sliding=self.sliding, **now))
+        found = self._check_shapes(Tendon(self._points, sliding=self.sliding, **now))
+        return variant(found, _follows=tuple(name for name in self._follows if name not in values))
+
+    def _on_reshaped(self, now: dict[int, Any]) -> Tendon:
+        """Return the tendon through the same places of the matter of bodies with other rest positions.
+
+        now: these bodies, by the ids of those they stand for.
+        """
+        points = [
+            (now[id(body)], moved_with(body, now[id(body)], point)) if id(body) in now else (body, point)
+            for body, point in self._points
+        ]
+        bodies = tuple(now.get(id(body), body) for body in self.bodies)
+        found = variant(self, _points=points, bodies=bodies)
+        lengths = found._lengths
+        length = float(lengths.sum())
+        own = {name: number(name, "m", _OF_LENGTH[name] * length, 0.0, above=True) for name in self._follows}
+        return variant(found, _fractions=lengths / length, **own)
+
+    def _by_rest_positions(self, body: Shell | Solid, label: str, gradient: Gradient) -> np.ndarray:
+        """Return the gradient by the rest positions of a body, (n_v, 3), through the values that follow from the length."""
+        by_length = sum(_OF_LENGTH[name] * float(gradient.value(label, name).sum()) for name in self._follows)
+        along = np.diff(self.points, axis=0) / self._lengths[:, None]
+        by_points = np.zeros_like(self.points)
+        by_points[1:] += by_length * along
+        by_points[:-1] -= by_length * along
+        found = np.zeros((body.mesh.n_vertices, 3))
+        for (owner, point), by in zip(self._points, by_points, strict=True):
+            if owner is body:
+                vertices, weights = embedded_in(body, point)
+                np.add.at(found, vertices, weights[:, None] * by)
+        return found
 
     def _tension_at(self, length: Numbers) -> Computed:
         """Return the tension at a length [m], N; of a tendon that does not slide, for all segments, (..., segments)."""

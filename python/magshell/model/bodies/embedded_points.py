@@ -56,6 +56,18 @@ def embed_points(
     return [_without_zeros(*each) for each in found]
 
 
+def embedded_in(body: Any, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices of a Shell or Solid in whose element a point (3,) m lies, and their weights."""
+    vertices, weights, _ = _in_solid(body, point) if isinstance(body, Solid) else _on_shell(body, point)
+    return vertices, weights
+
+
+def moved_with(body: Any, now: Any, point: np.ndarray) -> np.ndarray:
+    """Return where a point (3,) m of a body lies in the same body with other rest positions, `now`."""
+    vertices, weights = embedded_in(body, point)
+    return point + weights @ (now.mesh.rest_positions[vertices] - body.mesh.rest_positions[vertices])
+
+
 def _without_zeros(vertices: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes that have a weight, and their weights."""
     nonzero = np.abs(weights) > 1e-12

@@ -11,7 +11,7 @@ from ..._input.quantity import quantity, real_numbers
 from ..._input.tensors import stacked
 from ..._runtime.frozen import variant
 from ..bodies.bodies import BODIES, Bodies
-from ..bodies.embedded_points import embed_points
+from ..bodies.embedded_points import embed_points, embedded_in, moved_with
 from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from ..._input.kinds import Computed, Numbers, SolveResult
     from ..rigid.equimomental_points import RigidBodyPoints
+    from ..scene.values import Gradient
 
     OnBody: TypeAlias = tuple[Shell | Solid | RigidBody, Numbers]
 
@@ -101,6 +102,9 @@ class Spring(Springs):
         self._check_kind(rest_length)
         self.rest_length: np.ndarray | None = self._length(rest_length) if self._is_axial else None
         self.ground: np.ndarray | None = np.array(second) if on_ground else None
+        self._follows = ("rest_length",) * (self._is_axial and rest_length is None) + ("ground",) * (
+            b is None
+        )
         movable = on_ground and damping is None
         self._replaceable = self._in_time = (
             "stiffness",
@@ -163,6 +167,49 @@ class Spring(Springs):
             kept = self.ground if ground is None else ground
             found = variant(found, ground=quantity("ground", "m", kept, self.ground.shape))
         return self._check_shapes(found)
+
+    def _on_reshaped(self, now: dict[int, Any]) -> Spring:
+        """Return the springs at the same places of the matter of bodies with other rest positions.
+
+        now: these bodies, by the ids of those they stand for. Given points of the ground stay.
+        """
+        first, second = (
+            np.array([moved_with(body, now[id(body)], point) for point in points])
+            if id(body) in now
+            else points
+            for body, points in zip(self._of, self._ends, strict=True)
+        )
+        if not self._is_axial:
+            second = first
+        found = variant(
+            self,
+            _ends=(first, second),
+            _of=tuple(now.get(id(body), body) for body in self._of),
+            bodies=tuple(now.get(id(body), body) for body in self.bodies),
+        )
+        own = {}
+        if "rest_length" in self._follows:
+            own["rest_length"] = found._length(None)
+        if "ground" in self._follows:
+            own["ground"] = np.array(second[0] if self._one else second)
+        return variant(found, **own)
+
+    def _by_rest_positions(self, body: Shell | Solid, label: str, gradient: Gradient) -> np.ndarray:
+        """Return the gradient by the rest positions of a body, (n_v, 3), through the values that follow from the ends."""
+        by_ends = np.zeros((2, len(self), 3))
+        if "rest_length" in self._follows:
+            along = self._ends[1] - self._ends[0]
+            along = along / np.linalg.norm(along, axis=1, keepdims=True)
+            by_ends[1] += gradient.value(label, "rest_length").reshape(-1, 1) * along
+            by_ends[0] -= by_ends[1]
+        if "ground" in self._follows and "ground" in self._replaceable:
+            by_ends[0] += gradient.value(label, "ground").reshape(-1, 3)
+        found = np.zeros((body.mesh.n_vertices, 3))
+        for owner, points, by_points in zip(self._of, self._ends, by_ends, strict=True):
+            for point, by in zip(points, by_points, strict=True) if owner is body else ():
+                vertices, weights = embedded_in(body, point)
+                np.add.at(found, vertices, weights[:, None] * by)
+        return found
 
     def _unit(self, name: str) -> str:
         return {"stiffness": "N/m", "rest_length": "m", "damping": "N s/m", "ground": "m"}[name]

@@ -10,7 +10,7 @@ import numpy as np
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._input.tensors import stacked
-from ..._runtime.frozen import Frozen
+from ..._runtime.frozen import Frozen, variant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,12 +26,14 @@ class Springs(Owner, ABC):
     """
 
     _for_all = False  # springs name their bodies: none acts on all bodies of a scene
+    _follows: tuple[str, ...] = ()  # the values that follow from where the ends are at rest
     stiffness: np.ndarray
     damping: np.ndarray | None
 
     def replaced(self, **values: Any) -> Any:
         """Return the same springs with other values, of the same shapes."""
-        return self._made({name: getattr(self, name) for name in self._replaceable} | values)
+        found = self._made({name: getattr(self, name) for name in self._replaceable} | values)
+        return variant(found, _follows=tuple(name for name in self._follows if name not in values))
 
     @abstractmethod
     def _made(self, values: dict[str, Any]) -> Any:

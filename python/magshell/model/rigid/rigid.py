@@ -10,7 +10,7 @@ from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._input.scalars import positive
 from ..._input.selections import selection
-from ..._runtime.frozen import Frozen
+from ..._runtime.frozen import Frozen, variant
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.generate.stuffed import from_distance
 from ...mesh.shapes import Shape
@@ -99,6 +99,7 @@ class RigidBody(Owner):
     """
 
     _for_all = False
+    _center_follows = False  # whether its center is the mean of vertices that other rest positions have moved
     _in_time = ("force", "torque")
     _replaceable = ("mass", "inertia", "center", "magnetic_moment", *_in_time, "velocity", "angular_velocity")
 
@@ -199,6 +200,17 @@ class RigidBody(Owner):
         """Return the rigid body without the force and torque that act on it."""
         acting = {name: np.zeros(3) for name in self._in_time if getattr(self, name).any()}
         return self.replaced(**acting) if acting else self
+
+    def _on_reshaped(self, now: dict[int, Any], of: Shell | Solid | None) -> RigidBody:
+        """Return the rigid body whose center, if it is the mean of its vertices, moves with them.
+
+        now: bodies with other rest positions, by the ids of those they stand for. of: the body whose vertices it has.
+        """
+        found = self if self.body is None else variant(self, body=now.get(id(self.body), self.body))
+        if self.vertices is None or id(of) not in now or not (self.center is None or self._center_follows):
+            return found
+        center = now[id(of)].mesh.rest_positions[self.vertices].mean(axis=0)
+        return variant(found, center=center, _center_follows=True)
 
     def _again(self, values: dict[Any, Any]) -> RigidBody:
         return type(self)(self.vertices, body=self.body, shape=self.shape, **values)

@@ -13,8 +13,9 @@ from ..._runtime.frozen import remember, variant
 from ...errors import NoGradient
 from ..actuators.tendon import Tendon
 from ..contact.body_contact import SelfContact
-from ..loads.springs import Springs
-from ..supports.displacement_ties import DisplacementTie
+from ..loads.foundation import ElasticFoundation
+from ..loads.spring import Spring
+from ..rigid.rigid import RigidBody
 from ..supports.supports import Clamp, Pin
 from .rest_gradient import without_rest_gradient
 from .scene import Scene
@@ -29,7 +30,8 @@ REST = "rest_positions"
 class ReshapedScene(Scene):
     """A scene that differs from another one in the rest positions of some bodies.
 
-    Each edge has a direction of its own across it, since the directions of two edges of one line may turn differently.
+    Each edge has a direction of its own across it, since the directions of two edges of one line may turn differently. The
+    points that stand for the inertia of a rigid body stay, as their places in it are arbitrary.
     """
 
     _shares_directions = False
@@ -60,6 +62,12 @@ def turning_supports(scene: Scene) -> list[str]:
     supports = getattr(scene, "supports", ())  # a solve refuses what is no scene after this
     moved = [support for support in supports if isinstance(support, Pin | Clamp)]
     return ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
+
+
+def rigid_vertices(scene: Scene) -> list[str]:
+    """Return words for vertices that rigid bodies carry, as their free flight has no derivative by where these are."""
+    carried = any(part.vertices is not None for part in getattr(scene, "rigid_parts", ()))
+    return ["vertices that belong to a RigidBody"] * carried
 
 
 def without_rest_positions(scene: Scene, values: dict[Any, dict[str, Any]]) -> dict[Any, dict[str, Any]]:
@@ -148,7 +156,13 @@ def _with_rest(
     own: dict[int, Any] = {}
 
     def stand_in(item: Any) -> Any:
-        found = now.get(id(item)) or _about(item, now)
+        if isinstance(item, RigidBody):
+            of = scene.bodies[0] if item.body is None and scene.bodies else item.body
+            found = item._on_reshaped(now, of)
+        elif isinstance(item, Tendon | Spring):
+            found = item._on_reshaped(now)
+        else:
+            found = now.get(id(item)) or _about(item, now)
         if found is not item:
             own[id(item)] = found
         return found
@@ -158,7 +172,7 @@ def _with_rest(
         for name, each in Scene.__getstate__(scene).items()
     }
     there = ReshapedScene.__new__(ReshapedScene)
-    remember(there, _numbered_like=numbered_like)
+    remember(there, _numbered_like=numbered_like, _rigid_like=scene)
     there.__init__(**{**arguments, "allow_rigid_motions": True})
     own[id(scene)] = there
     own |= {id(body.skin): now[id(body)].skin for body in numbers if getattr(body, "skin", None) is not None}
@@ -211,15 +225,24 @@ def _check_same_supports(scene: Scene, there: Scene) -> None:
         raise ValueError(
             f"{REST} [m] change what supports hold at vertex {vertex}: it must stay in, or off, the SymmetryPlane"
         )
+    before, after = (_tied_vertices(each) for each in (scene, there))
+    if before != after:
+        vertex = min(each[0] for each in before ^ after)
+        raise ValueError(
+            f"{REST} [m] change what a Periodic ties at vertex {vertex}: keep the images of vertices"
+        )
+
+
+def _tied_vertices(scene: Scene) -> set[tuple[int, ...]]:
+    """Return the vertices of each equation between displacements, in one tuple."""
+    return {tuple(row) for each in scene._constraints.equations for row in each.vertices.tolist()}
 
 
 def _refuse_what_cannot_follow(scene: Scene) -> None:
     has = (
-        ("rigid bodies", scene.rigid_parts),
-        ("EqualDisplacement or Periodic", [s for s in scene.supports if isinstance(s, DisplacementTie)]),
-        ("a Tendon", [each for each in scene.actuators if isinstance(each, Tendon)]),
+        ("joints", scene.joints),
         ("an OwnField", scene.own_field),
-        ("springs", [load for load in scene.loads if isinstance(load, Springs)]),
+        ("an ElasticFoundation", [load for load in scene.loads if isinstance(load, ElasticFoundation)]),
     )
     found = [name for name, some in has if some]
     if found:

@@ -18,8 +18,11 @@ from ...mesh.rest_shape import (
     by_width,
 )
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
+from ..actuators.tendon import Tendon
 from ..contact.body_contact import width_of
 from ..loads.loads import AreaLoad, EdgeCouple, EdgeLoad
+from ..loads.spring import Spring
+from ..supports.displacement_ties import DisplacementTie
 from ..supports.supports import Clamp, rotation_matrix
 
 if TYPE_CHECKING:
@@ -48,6 +51,9 @@ def without_rest_gradient(scene: Scene) -> list[str]:
             found += [
                 f"the {name} of six-node shells" for name in _GROWN if getattr(body, name, None) is not None
             ]
+    grounded = [load for load in _springs(scene) if "ground" in load._follows and load.body is not None]
+    if any(load.damping is not None for load in grounded):
+        found.append("a Spring with a damper to the ground where it is at rest")
     # The core knows its terms; words above say why where a term has a derivative in other scenes.
     return list(dict.fromkeys(found)) or list(dict.fromkeys(_core.without_rest_gradient(scene._model)))
 
@@ -69,11 +75,33 @@ def by_rest_positions(inputs: Inputs, body: Shell | Solid, gradient: Gradient) -
     found += _through_moves(values, span, gradient)
     found += _through_contacts(values, body, gradient)
     found += _through_masses(values, values.current(body), span, gradient)
+    found += _through_rigid_centers(values, body, gradient)
+    for own in [*_springs(scene), *(each for each in scene.actuators if isinstance(each, Tendon))]:
+        label = next(label for owner, label in scene._labels if owner is own)
+        found += values.current(own)._by_rest_positions(body, label, gradient)
     for load in map(values.current, scene.loads):
         part = scene._bodies.of(load)
         of_load = np.zeros((scene.mesh.n_vertices, 3))
         of_load[part.vertices] = _through_load(values, load, part, gradient)
         found += of_load[span.vertices]
+    return found
+
+
+def _springs(scene: Scene) -> list[Spring]:
+    return [load for load in scene.loads if isinstance(load, Spring)]
+
+
+def _through_rigid_centers(values: Values, body: Shell | Solid, gradient: Gradient) -> np.ndarray:
+    """Return the gradient through the centers of rigid bodies that are the means of their vertices, (n_v, 3)."""
+    scene = values.scene
+    found = np.zeros((body.mesh.n_vertices, 3))
+    for own, part in zip(scene.rigid_parts, values.rigid, strict=True):
+        of = scene.bodies[0] if own.body is None else own.body
+        if not own._center_follows or of is not body or "center" in values.replaced.get(own, {}):
+            continue
+        label = next(label for owner, label in scene._labels if owner is own)
+        by_center = part._gradients(label, values, gradient)["center"]
+        np.add.at(found, own.vertices, by_center / len(own.vertices))
     return found
 
 
@@ -116,6 +144,8 @@ def _through_moves(values: Values, span: Any, gradient: Gradient) -> np.ndarray:
     found = np.zeros((span.mesh.n_vertices, 3))
     for k, move in enumerate(values.constraints.moves):
         support = move.support
+        if isinstance(support, DisplacementTie):
+            continue
         if values.scene._bodies.of(support) is not span or support._move.center is not None:
             continue
         vertices = np.unique(

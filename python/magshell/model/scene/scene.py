@@ -116,6 +116,7 @@ class Scene(PlotMixin):
     _replaceable = ("gravity", "vertex_loads")
     _shares_directions = True  # whether edges with equal directions across them share one
     _numbered_like: Scene | None = None  # the scene whose numbering of elements and unknowns this one has
+    _rigid_like: Scene | None = None  # the scene whose points of rigid bodies this one has
     _stand_ins: dict[int, Any] = {}  # noqa: RUF012 - in a reshaped scene: {id of an original object: the object in its place}
 
     @grouped()
@@ -195,6 +196,8 @@ class Scene(PlotMixin):
         self._moment_directions = moment_directions(bodies, edges)
         constraints = gather(bodies, self.supports, self._moment_directions, self._shares_directions)
         self._rigid = rigid_body_points(bodies)
+        if self._rigid_like is not None:
+            self._rigid = self._rigid_like._rigid
         check_shapes(self._obstacle_contacts, self.rigid_parts, self._rigid)
         for k, part in enumerate(self.rigid_parts):
             if part.magnetic_moment is not None and not self.fields and not _has_own_field(self, part):

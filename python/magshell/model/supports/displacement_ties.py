@@ -65,7 +65,7 @@ class EqualDisplacement(DisplacementTie):
     body: the Shell or Solid whose vertices they are, in a scene of several bodies.
 
     The direction must be parallel or perpendicular to those along which other supports hold the vertices. Scenes with rigid
-    bodies, Projective Dynamics, other rest positions and finer meshes do not take it yet: an error says so.
+    bodies, Projective Dynamics and finer meshes do not take it yet: an error says so.
 
     >>> import magshell as ms
     >>> matter = ms.StVenantKirchhoff(young_modulus=1e6, poisson_ratio=0.3)
@@ -136,7 +136,7 @@ class Periodic(DisplacementTie):
     body: the Shell or Solid whose vertices they are, in a scene of several bodies.
 
     A vertex that another support holds along a slanted direction cannot be tied so. Scenes with rigid bodies, Projective
-    Dynamics, other rest positions and finer meshes do not take it yet: an error says so.
+    Dynamics and finer meshes do not take it yet: an error says so. Other rest positions keep images at one vector.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))

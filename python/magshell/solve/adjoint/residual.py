@@ -216,6 +216,8 @@ class Residual:
     def _prepare(self) -> None:
         if self.inputs.scene.rigid_parts:
             raise NoGradient("no gradient here: the scene has rigid bodies or skeletons")
+        if self.with_rest and self.inputs.scene._constraints.tied:
+            raise NoGradient(f"no gradient by {REST} here: the scene has an EqualDisplacement or a Periodic")
         self._model.term_energies(self.state, self.angle_branches, self.load_parameters)
 
     @property

@@ -22,6 +22,7 @@ from ...model.scene.values import Values
 from .differences import directional_derivative
 
 if TYPE_CHECKING:
+    from ...model.scene.scene import Scene
     from ...model.scene.solve_inputs import Inputs, Leaf
 
 # The first step as a fraction (1) of the largest entry of a value, and the step of a value that is zero (SI unit of the
@@ -129,6 +130,7 @@ def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.nd
         raise NoGradient(f"no tangent by {leaf.name}: {leaf.refusal}")
     model, state, load_parameters = inputs.scene._model, found.state, inputs.load_parameters
     if leaf.name == REST and leaf.owner is not None:
+        refuse_rigid_vertices(inputs.scene)
 
         def at(step: float) -> np.ndarray:
             values = values_in_neighbour(inputs, leaf, step * change)
@@ -176,6 +178,14 @@ def values_in_neighbour(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> Value
     there = neighbour(inputs.scene, {body: body.mesh.rest_positions + change})
     replaced = {there._own(owner): named for owner, named in inputs.values.replaced.items()}
     return Values(there, replaced, inputs.magnetization, sampling_of=inputs.values)
+
+
+def refuse_rigid_vertices(scene: Scene) -> None:
+    """Raise NoGradient if rigid bodies carry vertices, whose places in them follow the rest positions."""
+    if any(part.vertices is not None for part in scene.rigid_parts):
+        raise NoGradient(
+            f"no tangent by {REST} of scenes in which vertices belong to a RigidBody; take gradients with backward()"
+        )
 
 
 def steps_by_rest(leaf: Leaf, change: np.ndarray) -> list[float]:
