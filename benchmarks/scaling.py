@@ -186,9 +186,11 @@ def _gradient(scene: ms.Scene, inputs: dict[str, Any], found: ms.Equilibrium, ro
     """Measure the gradient of a function of all positions by all inputs, from the stored factorization."""
     options = ms.MixedNewton()._options()
     options.keep_factor = True
-    state, turns, load_parameters = found._state, found._angle_branches, found._load_parameters
+    state, angle_branches, load_parameters = found._state, found._angle_branches, found._load_parameters
     with Inputs(scene, **inputs, differentiable=True).in_core():
-        kept = _core.find_equilibrium(scene._model, state, turns, load_parameters, load_parameters, options)
+        kept = _core.find_equilibrium(
+            scene._model, state, angle_branches, load_parameters, load_parameters, options
+        )
         by_positions = np.ones((scene.mesh.n_vertices, 3))
         by_rotations = np.zeros(scene.mesh.n_edges)
         return clocked(lambda: _core.pull_back(scene._model, kept, by_positions, by_rotations), rounds=rounds)

@@ -1,4 +1,4 @@
-// Binds the adjoints: they take the gradient by positions and edge rotations and return the gradients by all
+// Binds the adjoints: they take the gradient with respect to positions and edge rotations and return the gradients with respect to all
 // parameters of a solve.
 #include "bindings/gradients.h"
 #include "magshell/adjoint/static.h"
@@ -27,7 +27,7 @@ py::tuple by_parameters(const Model& model, const Gradient& gradient) {
     return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
 }
 
-// Returns the gradients by all parameters and load parameters that add(gradient) adds up at a state.
+// Returns the gradients with respect to all parameters and load parameters that add(gradient) adds up at a state.
 template <class Add>
 py::tuple by_parameters_at(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
                            const Add& add) {

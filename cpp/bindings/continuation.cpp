@@ -9,7 +9,7 @@
 namespace magshell::bindings {
 namespace {
 
-PathResult follow(Model& model, const VectorXd& start, const Model::AngleBranches& turns,
+PathResult follow(Model& model, const VectorXd& start, const Model::AngleBranches& angle_branches,
                   const LoadParameters& from, const LoadParameters& to, const PathOptions& options,
                   const std::vector<Index>& entries, const py::object& until, const py::object& progress) {
     const TimeVaryingParameters varying(model.parameters().registry(), entries);
@@ -24,7 +24,7 @@ PathResult follow(Model& model, const VectorXd& start, const Model::AngleBranche
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     return follow_path(
-        model, start, turns, from, to, options, ends,
+        model, start, angle_branches, from, to, options, ends,
         [&](double at, double residual) { watch(at, residual); }, varying);
 }
 
@@ -34,7 +34,7 @@ void register_continuation(py::module_& module) {
     py::class_<PathPoint>(module, "PathPoint")
         .def_readonly("state", &PathPoint::state)
         .def_readonly("parameter", &PathPoint::parameter)
-        .def_readonly("turns", &PathPoint::angle_branches)
+        .def_readonly("angle_branches", &PathPoint::angle_branches)
         .def_readonly("n_negative_eigenvalues", &PathPoint::unstable_directions)
         .def_readonly("field_sampling_error", &PathPoint::field_sampling_error);
 
@@ -71,9 +71,9 @@ void register_continuation(py::module_& module) {
         .def_readonly("factorizations", &PathResult::factorizations)
         .def_readonly("failed_factorizations", &PathResult::failed_factorizations);
 
-    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("turns"), py::arg("from_"),
-               py::arg("to"), py::arg("options"), py::arg("varying"), py::arg("until") = py::none(),
-               py::arg("progress") = py::none());
+    module.def("follow_path", &follow, py::arg("model"), py::arg("start"), py::arg("angle_branches"),
+               py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("varying"),
+               py::arg("until") = py::none(), py::arg("progress") = py::none());
 }
 
 }  // namespace magshell::bindings

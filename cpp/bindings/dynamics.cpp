@@ -103,7 +103,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
     MotionInput input;
     input.start.q = to_vector(array("state"));
     input.start.v = to_vector(array("velocity"));
-    input.start.angle_branches = given["turns"].cast<Model::AngleBranches>();
+    input.start.angle_branches = given["angle_branches"].cast<Model::AngleBranches>();
     input.inertia = {model.bodies().vertex_weights(to_vector(array("mass"))),
                      model.bodies().vertex_weights(to_vector(array("damping")))};
     input.viscosity = viscosity_of(given);

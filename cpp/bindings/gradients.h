@@ -1,4 +1,4 @@
-// Converts gradients by parameters and load parameters to Python: flat, in the caller's order of rows.
+// Converts gradients with respect to parameters and load parameters to Python: flat, in the caller's order of rows.
 #pragma once
 
 #include "bindings/arrays.h"

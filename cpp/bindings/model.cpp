@@ -67,13 +67,13 @@ py::dict energies(const Model& model, const VectorXd& q, const LoadParameters& l
 }
 
 // Returns [(name, J)] for each term; terms of the same name, of several bodies, are consecutive.
-py::list term_energies(Model& model, const VectorXd& q, const Model::AngleBranches& turns,
+py::list term_energies(Model& model, const VectorXd& q, const Model::AngleBranches& angle_branches,
                        const LoadParameters& load_parameters) {
     std::vector<std::pair<std::string_view, double>> of_terms;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        model.set_angle_branches(turns);
+        model.set_angle_branches(angle_branches);
         of_terms = model.energies(q, load_parameters);
     }
     py::list energies;
@@ -263,8 +263,9 @@ void register_model(py::module_& module) {
                                    return names;
                                })
         .def("energies", &energies)
-        .def("term_energies", &term_energies, "[(name, J)] of each term, at a state with these turns.",
-             py::arg("q"), py::arg("turns"), py::arg("load_parameters"))
+        .def("term_energies", &term_energies,
+             "[(name, J)] of each term, at a state with these branches of angles.", py::arg("q"),
+             py::arg("angle_branches"), py::arg("load_parameters"))
         .def(
             "field_sampling_error",
             [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
@@ -293,26 +294,26 @@ void register_model(py::module_& module) {
         .def(
             "driving",
             [](Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-               const Model::AngleBranches& turns) {
+               const Model::AngleBranches& angle_branches) {
                 const std::lock_guard lock(model.in_use());
-                model.set_angle_branches(turns);
+                model.set_angle_branches(angle_branches);
                 model.evaluate(q, load_parameters);
                 return model.dof_map().motor_forces(model.residual().gradient);
             },
-            py::arg("q"), py::arg("load_parameters"), py::arg("turns"),
+            py::arg("q"), py::arg("load_parameters"), py::arg("angle_branches"),
             "What the motors of joints do in an equilibrium q, N and N m, one after another.",
             py::call_guard<py::gil_scoped_release>())
         .def(
             "held_forces",
-            [](Model& model, const VectorXd& q, const Model::AngleBranches& turns,
+            [](Model& model, const VectorXd& q, const Model::AngleBranches& angle_branches,
                const LoadParameters& load_parameters) {
                 const std::lock_guard lock(model.in_use());
-                model.set_angle_branches(turns);
+                model.set_angle_branches(angle_branches);
                 model.evaluate(q, load_parameters);
                 return model.dof_map().along_supports(model.residual().gradient);
             },
             "(3 m,) [N], with which supports pull at the held nodes of a scene at rest.", py::arg("q"),
-            py::arg("turns"), py::arg("load_parameters"), py::call_guard<py::gil_scoped_release>())
+            py::arg("angle_branches"), py::arg("load_parameters"), py::call_guard<py::gil_scoped_release>())
         .def(
             "assemble",
             [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {

@@ -46,7 +46,7 @@ void register_sheet(py::module_& module) {
                py::arg("load_parameters"),
                "[(name, whether of a solid, number of the sheet or solid, J of each element)] of the terms "
                "that are sums "
-               "over elements, in the order of term_energies. Angles have no turns.");
+               "over elements, in the order of term_energies. Angles are on their first branch.");
     module.def(
         "shell_stresses", &stresses_of, py::arg("model"), py::arg("sheet"), py::arg("q"),
         "(Green's strain, change of curvature [1/m], membrane force [N/m], bending moment [N]) of a sheet's "

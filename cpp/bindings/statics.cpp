@@ -10,7 +10,7 @@
 namespace magshell::bindings {
 namespace {
 
-StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranches& turns,
+StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranches& angle_branches,
                     const LoadParameters& from, const LoadParameters& to, const StaticsOptions& options,
                     const py::object& progress, const std::vector<Index>& entries) {
     const Watch watch(progress);
@@ -19,8 +19,8 @@ StaticsResult solve(Model& model, const VectorXd& start, const Model::AngleBranc
     const py::gil_scoped_release unlocked;
     const std::lock_guard lock(model.in_use());
     return find_equilibrium(
-        model, start, turns, from, to, options, [&](double at, double residual) { watch(at, residual); },
-        varying);
+        model, start, angle_branches, from, to, options,
+        [&](double at, double residual) { watch(at, residual); }, varying);
 }
 
 void add_effort(StaticsResult& result, const StaticsResult& earlier) {
@@ -70,7 +70,7 @@ py::tuple carried(Model& model, const VectorXd& q, const LoadParameters& load_pa
 
 // Returns the lowest eigenmodes of all degrees of freedom about an equilibrium, their eigenvalues [N/m3], and
 // the number of negative ones.
-py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::AngleBranches& turns,
+py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::AngleBranches& angle_branches,
                        const LoadParameters& load_parameters, int count, const py::object& progress) {
     const Watch watch(progress);
     std::vector<Mode> modes;
@@ -78,7 +78,7 @@ py::tuple lowest_modes(Model& model, const VectorXd& state, const Model::AngleBr
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
-        model.set_angle_branches(turns);
+        model.set_angle_branches(angle_branches);
         Newton newton(model, {}, [&](double residual) { watch(1.0, residual); });
         const FactorReport report = newton.factorize_at(state, load_parameters);
         negative = report.negative_pivots;
@@ -158,7 +158,7 @@ void register_statics(py::module_& module) {
     py::class_<StaticsResult>(module, "StaticsResult")
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
-        .def_readonly("turns", &StaticsResult::angle_branches)
+        .def_readonly("angle_branches", &StaticsResult::angle_branches)
         .def_readonly("load_parameters", &StaticsResult::load_parameters)
         .def_readonly("load_fraction", &StaticsResult::progress)
         .def_readonly("reason", &StaticsResult::reason)
@@ -183,11 +183,11 @@ void register_statics(py::module_& module) {
         .def("add_effort_of", &add_effort, "Count what an earlier part of the same search did as well.",
              py::arg("earlier"));
 
-    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("turns"),
+    module.def("find_equilibrium", &solve, py::arg("model"), py::arg("start"), py::arg("angle_branches"),
                py::arg("from_"), py::arg("to"), py::arg("options"), py::arg("progress") = py::none(),
                py::arg("varying") = std::vector<Index>());
     module.def(
-        "lowest_modes", &lowest_modes, py::arg("model"), py::arg("state"), py::arg("turns"),
+        "lowest_modes", &lowest_modes, py::arg("model"), py::arg("state"), py::arg("angle_branches"),
         py::arg("load_parameters"), py::arg("count"), py::arg("progress") = py::none(),
         "Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of "
         "unstable directions of an equilibrium; none where it is neutral.");

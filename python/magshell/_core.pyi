@@ -408,7 +408,7 @@ class Model:
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        turns: collections.abc.Sequence[
+        angle_branches: collections.abc.Sequence[
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
         ],
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
@@ -465,7 +465,7 @@ class Model:
     def held_forces(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        turns: collections.abc.Sequence[
+        angle_branches: collections.abc.Sequence[
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
         ],
         load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -609,13 +609,13 @@ class Model:
     def term_energies(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-        turns: collections.abc.Sequence[
+        angle_branches: collections.abc.Sequence[
             collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
         ],
         load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     ) -> list[typing.Any]:
         """
-        [(name, J)] of each term, at a state with these turns.
+        [(name, J)] of each term, at a state with these branches of angles.
         """
     def term_gradient(
         self,
@@ -786,6 +786,8 @@ class StaticsResult:
         Count what an earlier part of the same search did as well.
         """
     @property
+    def angle_branches(self) -> list[list[float]]: ...
+    @property
     def at_roundoff(self) -> bool: ...
     @property
     def bytes(self) -> int: ...
@@ -831,10 +833,10 @@ class StaticsResult:
     def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def symmetric_saddles(self) -> int: ...
-    @property
-    def turns(self) -> list[list[float]]: ...
 
 class PathPoint:
+    @property
+    def angle_branches(self) -> list[list[float]]: ...
     @property
     def field_sampling_error(self) -> float: ...
     @property
@@ -843,8 +845,6 @@ class PathPoint:
     def parameter(self) -> float: ...
     @property
     def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def turns(self) -> list[list[float]]: ...
 
 class CriticalKind:
     """
@@ -1149,7 +1149,7 @@ def element_energies(
     load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> list[typing.Any]:
     """
-    [(name, whether of a solid, number of the sheet or solid, J of each element)] of the terms that are sums over elements, in the order of term_energies. Angles have no turns.
+    [(name, whether of a solid, number of the sheet or solid, J of each element)] of the terms that are sums over elements, in the order of term_energies. Angles are on their first branch.
     """
 
 def elimination_fronts(
@@ -1177,7 +1177,9 @@ def fibre_states(
 def find_equilibrium(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    angle_branches: collections.abc.Sequence[
+        collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+    ],
     from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: StaticsOptions,
@@ -1201,7 +1203,9 @@ def first_order_change(
 def follow_path(
     model: Model,
     start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    angle_branches: collections.abc.Sequence[
+        collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+    ],
     from_: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     to: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     options: PathOptions,
@@ -1230,7 +1234,9 @@ def loaded_part(
 def lowest_modes(
     model: Model,
     state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
-    turns: collections.abc.Sequence[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]],
+    angle_branches: collections.abc.Sequence[
+        collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+    ],
     load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
     count: typing.SupportsInt | typing.SupportsIndex,
     progress: typing.Any = None,

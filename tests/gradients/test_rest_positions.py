@@ -377,11 +377,6 @@ def test_terms_without_a_derivative_by_rest_positions_are_named_before_the_solve
     solved(scene, mesh.rest_positions)
     with pytest.raises(ms.NoGradient, match="derivative by them of the growth of six-node shells yet"):
         solved(scene, torch.tensor(mesh.rest_positions, requires_grad=True))
-    sheet = shell()
-    rigid = ms.RigidBody(MESH.faces[-1], mass=1e-3, inertia=np.full(3, 1e-6))
-    scene = ms.Scene([sheet, rigid], supports=[ms.Clamp(MESH.edges_at(x=0.0))])
-    with pytest.raises(ValueError, match="rigid bodies yet"):
-        ms.equilibrium(scene, values={sheet: {"rest_positions": MOVED}})
 
 
 @pytest.mark.parametrize(

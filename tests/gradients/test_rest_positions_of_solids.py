@@ -181,7 +181,7 @@ def test_tetrahedra_that_rest_positions_turn_inside_out_are_named_before_the_sol
 
 
 @pytest.mark.parametrize(
-    "name", ["actuated at rest", "on springs at rest", "two sheets with their own field at rest"]
+    "name", ["at rest, with a skeleton", "on springs at rest", "two sheets with their own field at rest"]
 )
 def test_scenes_that_cannot_follow_rest_positions_yet_say_so(name):
     scene = kind(name).scene

@@ -8,14 +8,15 @@
 
 namespace magshell {
 
-/// Takes such derivatives, one after another, of functions that resemble each other: it begins with the step that served last.
+/// Computes such derivatives of similar functions, one after another: the step that sufficed for the last one is tried first.
 class DirectionalDerivative {
   public:
     using Function = std::function<VectorXd(double)>;
 
-    /// Returns the derivative. ends: of the blocks of entries that have one unit each, except the last one. first_step: changes the function
-    /// as much as its smoothness allows, as far as is known. noise: the largest numbers that cancel in each block, of which round-off is a
-    /// part. The function may throw InvalidInput beyond its range. Throws InvalidInput with the name if the function is not smooth.
+    /// Returns the derivative. The entries of the function form blocks, each of one unit; ends: where the blocks end, except the last one.
+    /// first_step: the largest step over which the function is expected to be smooth. noise: the largest numbers that cancel in each block;
+    /// round-off is a fraction of them. The function may throw InvalidInput beyond its range. Throws InvalidInput with the name if the
+    /// function is not smooth.
     VectorXd of(const Function& function, std::span<const Index> ends, double first_step,
                 std::span<const double> noise, const char* name);
     VectorXd of(const Function& function, double first_step, double noise, const char* name) {
@@ -33,8 +34,8 @@ class DirectionalDerivative {
     Attempt attempt(const Function& function, std::span<const Index> ends, double step,
                     std::span<const double> noise);
 
-    double factor_ = 1.0;    // [-] of the first step
-    double expected_ = 0.0;  // [-] the error that was found then
+    double factor_ = 1.0;    // [-] by which the last derivative had to shorten its first step
+    double expected_ = 0.0;  // [-] error of that derivative
     int evaluations_ = 0;
 };
 

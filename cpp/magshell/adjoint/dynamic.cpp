@@ -83,7 +83,8 @@ class Backward {
         add_state_gradient(step);
     }
 
-    // Returns the gradient by the motor forces in the state after this number of steps; empty if the loss does not depend on them.
+    // Returns the gradient with respect to the motor forces in the state after this number of steps; empty if the loss does not depend on
+    // them.
     VectorXd by_motor_forces(Index steps) const {
         const Index k = input_.recorded_after(steps);
         if (by_.motor_forces.empty() || k < 0) return {};
@@ -91,13 +92,14 @@ class Backward {
         return by.isZero(0.0) ? VectorXd() : by;
     }
 
-    // The gradient by the start of a stage, or of the nearby state at which motor forces are evaluated.
+    // The gradient with respect to the start of a stage, or of the nearby state at which motor forces are evaluated.
     struct BeforeStage {
         VectorXd x_hat, v_hat;
         double dt = 0.0;
     };
 
-    // Adds the contribution of lambda, at a state with these rates, to the gradients by inertia, by forces, and by the start of the stage.
+    // Adds the contribution of lambda, at a state with these rates, to the gradients with respect to inertia, by forces, and by the start
+    // of the stage.
     void through_rates(const StepAlgebra& algebra, const VectorXd& lambda,
                        const KinematicsGradient& by_forces, const VectorXd& v, const VectorXd& w,
                        BeforeStage& by) {
@@ -106,7 +108,7 @@ class Backward {
         const VectorXd accelerated = lambda.cwiseProduct(w), moved = lambda.cwiseProduct(v);
         g_.mass += accelerated;
         g_.damping += moved;
-        // The derivative by dt of M (x - x^ - a dt v^)/(a dt)^2 + Gamma (x - x^)/(a dt) at constant x^ and v^.
+        // The derivative with respect to dt of M (x - x^ - a dt v^)/(a dt)^2 + Gamma (x - x^)/(a dt) at constant x^ and v^.
         by.dt -= (mass.dot(accelerated + moved / adt) + damping.dot(moved)) / dt;
         by.x_hat -= algebra.weights().cwiseProduct(lambda);
         by.v_hat -= mass.cwiseProduct(lambda) / adt;
@@ -154,7 +156,7 @@ class Backward {
         const VectorXd by_earlier = std::move(by_v_before_);
         by_v_before_ = VectorXd();
         BeforeStage by_end{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
-        // Gradients by w and c of the last stage that come from the motor forces; by_c: by c of the present stage.
+        // Gradients with respect to w and c of the last stage that come from the motor forces; by_c: by c of the present stage.
         VectorXd by_w_last = VectorXd::Zero(model_.size()), by_c_last = by_w_last, by_c;
         if (by_motor_forces.size() > 0)
             back_through_motors(algebra, at, record, step, substep, by_motor_forces, viscous, by_v.back(),
@@ -256,9 +258,9 @@ class Backward {
         viscous.joints.set_history(i);
     }
 
-    // Goes back through the acceleration by contact, c = J (J^T M J)^-1 J^T f, at the evaluated stage. by_c: gradient by it. Adds the
-    // gradients by the masses, and by the state: by_x, and as forces on free dofs alone by_free. Returns the gradient by minus the
-    // scaled contact forces.
+    // Goes back through the acceleration by contact, c = J (J^T M J)^-1 J^T f, at the evaluated stage. by_c: gradient with respect to it.
+    // Adds the gradients with respect to the masses, and by the state: by_x, and as forces on free dofs alone by_free. Returns the gradient
+    // with respect to minus the scaled contact forces.
     VectorXd back_through_contact(const VectorXd& q, const VectorXd& c, double factor, const VectorXd& by_c,
                                   const LoadParameters& load_parameters, VectorXd& by_x, VectorXd& by_free) {
         const VectorXd& mass = input_.inertia.mass;
@@ -287,8 +289,8 @@ class Backward {
         return by_forces;
     }
 
-    // Returns lambda of a stage and the gradient by the kinematics of its forces. Adds the gradients by the scene and the load parameters.
-    // by_c: gradient by the acceleration by contact; empty if contact is not implicit.
+    // Returns lambda of a stage and the gradient with respect to the kinematics of its forces. Adds the gradients with respect to the scene
+    // and the load parameters. by_c: gradient with respect to the acceleration by contact; empty if contact is not implicit.
     std::pair<VectorXd, KinematicsGradient> back_through(const StepAlgebra& algebra, const StepRates& at,
                                                          int i, const SubstepRecord& record, Index step,
                                                          const Substep& substep, VectorXd& by_x,
@@ -386,9 +388,9 @@ class Backward {
         return forces + weights.cwiseProduct(along);
     }
 
-    // Adds the gradients by the scene and the load parameters for an adjoint at the evaluated state, plus the motion along the motors if the
-    // loss depends on their forces. by_contact: gradient by minus the contact forces, beside that by lambda. Returns the gradient by the
-    // kinematics.
+    // Adds the gradients with respect to the scene and the load parameters for an adjoint at the evaluated state, plus the motion along the
+    // motors if the loss depends on their forces. by_contact: gradient with respect to minus the contact forces, beside that by lambda.
+    // Returns the gradient with respect to the kinematics.
     KinematicsGradient by_scene(const VectorXd& q, const LoadParameters& load_parameters,
                                 const ProximalTerm& proximal, Index step, const Substep& substep,
                                 double fraction, const VectorXd& lambda, const VectorXd& by_motor_forces,
@@ -425,7 +427,8 @@ class Backward {
         return by_forces;
     }
 
-    // Distributes a gradient by the load parameters at a fraction of a step to the two entries that they are interpolated from.
+    // Distributes a gradient with respect to the load parameters at a fraction of a step to the two entries that they are interpolated
+    // from.
     void add_by_load_parameters(Index step, double fraction, const LoadParameters& by) {
         const auto [first, weight] = input_.between(step, fraction);
         g_.load_parameters[first] += (1.0 - weight) * by;
@@ -477,7 +480,7 @@ class Backward {
     const GradientsByStates& by_;
     Stepper stepper_;
     Gradient scene_;  // by all parameters, and by the load parameters of the current stage
-    // Gradients by the rates and by the Maxwell strains at the beginning of the last step processed.
+    // Gradients with respect to the rates and by the Maxwell strains at the beginning of the last step processed.
     VectorXd by_w_;
     VectorXd
         by_v_before_;  // by the velocity at the beginning of the step before that; empty if nothing depends on it

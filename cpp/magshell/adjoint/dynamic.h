@@ -34,11 +34,11 @@ struct GradientsByStates {
     std::vector<VectorXd> q, v;  // by the dofs and by the velocities
     std::vector<VectorXd>
         motor_forces;  // by the motor forces, in the order of DofMap::motor_forces; empty if the loss does not depend on them
-    bool wants_rest = false;  // whether the gradient by rest positions is asked for
+    bool wants_rest = false;  // whether the gradient with respect to rest positions is asked for
 };
 
-/// Returns the gradients by all inputs from those by the recorded states. Throws InvalidInput if the motion was not stored for its
-/// adjoint.
+/// Returns the gradients with respect to all inputs from those with respect to the recorded states. Throws InvalidInput if the motion was
+/// not stored for its adjoint.
 MotionGradient motion_vjp(Model& model, const MotionInput& input, const MotionResult& motion,
                           const GradientsByStates& by, const MotionWatch& watch = {});
 

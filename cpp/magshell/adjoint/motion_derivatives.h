@@ -1,4 +1,5 @@
-// Derivatives of what a scene computes at a fixed state, along a direction of the inputs of a motion and of what a stage begins with.
+// Derivatives of forces, strains and prescribed motions of a scene at a fixed state, along one direction of the inputs of a motion and of
+// the predictions with which a stage begins. For motion_tangent.h.
 #pragma once
 
 #include <map>
@@ -12,16 +13,17 @@
 
 namespace magshell {
 
-/// A stage: where it is, and the derivatives of what it begins with.
+/// A stage of a step, with the derivatives (tangents) of the quantities with which it begins. Names as in motion_tangent.h.
 struct StageTangent {
     const SubstepRecord& record;
-    const VectorXd &x_hat, &v_hat;
+    const VectorXd &x_hat, &v_hat;  // predictions of x and v
     const VectorXd &x_hat_tangent, &v_hat_tangent;
     const Model::AngleBranches& angle_branches;
-    double T, T_tangent;
+    double T, T_tangent;  // [s] a dt, the time of the stage
     double contact_factor;
-    LoadParameters load_parameters, tangent, begin, begin_tangent;
-    const VectorXd& q_begin_tangent;  // of the state at the beginning of the step
+    LoadParameters load_parameters, tangent;  // in the stage
+    LoadParameters begin, begin_tangent;      // at the beginning of the step
+    const VectorXd& q_begin_tangent;          // of the state there
 };
 
 /// The derivatives of the forces at a fixed state, and of the contact forces among them.
@@ -29,10 +31,12 @@ struct ForceTangent {
     VectorXd gradient, contact;
 };
 
-/// The change of the state by what is prescribed, and of the reduced residual by moved joints; empty where there is none.
+/// The derivative of the prescribed motion of a state; parts are empty where there is none.
 struct PrescribedTangent {
-    VectorXd moved, driven, turned;
-    VectorXd all() const { return driven.size() > 0 ? VectorXd(moved + driven) : moved; }
+    VectorXd by_supports;       // motion of all dofs
+    VectorXd by_motors;         // motion of all dofs
+    VectorXd reduced_residual;  // change of the reduced residual because joints rotate or move
+    VectorXd motion() const { return by_motors.size() > 0 ? VectorXd(by_supports + by_motors) : by_supports; }
 };
 
 class MotionDerivatives {
@@ -47,7 +51,7 @@ class MotionDerivatives {
     Model& set(double t, const LoadParameters& load_parameters);
     /// Sets the model to the conditions of a stage.
     void set_stage(const StageTangent& stage);
-    /// Says the strain history that was set in the elastic terms of the model; or nullptr.
+    /// Takes note of the strain history that was set in the elastic terms of the model; nullptr if none was.
     void set_history(const StrainSet* shift) { shift_ = shift; }
     /// Returns a step of differences over which the inputs change little, and so do numbers of these sizes at these rates.
     double step_along(std::initializer_list<std::pair<double, double>> sizes_and_rates) const;
@@ -59,10 +63,10 @@ class MotionDerivatives {
     /// Returns the derivative of the strains at q, the state evaluated last, along a motion and by the inputs.
     StrainSet strains(ViscousTerms& terms, const VectorXd& q, const VectorXd& motion,
                       const LoadParameters& load_parameters, const LoadParameters& tangent);
-    /// Returns that of the strain rates of joint dampers at the beginning of a step; tangents: of q and v there.
+    /// Returns the derivative of the strain rates of joint dampers at the beginning of a step, for the tangents of q and v there.
     StrainSet damper_rates(const MotionState& begin, const VectorXd& q_tangent, const VectorXd& v_tangent,
                            const LoadParameters& load_parameters, const LoadParameters& tangent);
-    /// Returns how supports, motors and joints move a state at which the model was evaluated last; gradient: of the stage there.
+    /// Returns the prescribed motion of a state at which the model was evaluated last. gradient: of the stage there.
     PrescribedTangent prescribed(const StageTangent& stage, const VectorXd& q, const VectorXd& gradient);
 
   private:
@@ -70,7 +74,7 @@ class MotionDerivatives {
     Model& reshaped_at(double t);
     void begin_step(Model& model, const StageTangent& stage, double t);
     void find_changing_forces();
-    /// Returns the largest force on any dof that cancels in the residual at q, or at states before that reached as far.
+    /// Returns the largest force on any dof that cancels in the residual at q; the last result is kept for states that extend no further.
     double cancelling(const VectorXd& q);
 
     // The model of the scene in another rest shape, while the values vary in time.

@@ -16,7 +16,7 @@
 namespace magshell {
 namespace {
 
-// RAII guard that gives the scene its values again.
+// RAII guard that restores the values of the scene.
 class ScopedValues {
   public:
     ScopedValues(ModelParameters& parameters, const VectorXd& values)
@@ -30,9 +30,11 @@ class ScopedValues {
     const VectorXd& values_;
 };
 
-class Forward {
+// Carries the tangent of the state from step to step.
+class ForwardSweep {
   public:
-    Forward(Newton& newton, const MotionInput& input, const VectorXd& values, const MotionInputTangent& along)
+    ForwardSweep(Newton& newton, const MotionInput& input, const VectorXd& values,
+                 const MotionInputTangent& along)
         : newton_(newton),
           model_(newton.model()),
           input_(input),
@@ -40,13 +42,13 @@ class Forward {
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
           derivatives_(model_, values, input.varying, along) {}
 
-    // Begins with the tangent of the start, which is recorded too.
+    // Computes the tangent of the start and records it.
     void begin(const MotionState& start) {
         find_start(start);
         record(0, {});
     }
 
-    // Continues the tangent through a step.
+    // Computes the tangent after a step from that before it.
     void follow(Index step, const Substeps& substeps, const std::vector<SubstepRecord>& records) {
         progress_ = static_cast<double>(step) / static_cast<double>(input_.steps());
         const bool recorded = input_.recorded_after(step + 1) >= 0;
@@ -90,19 +92,20 @@ class Forward {
 
     void record(Index steps, VectorXd motor_forces) {
         if (input_.recorded_after(steps) < 0) return;
-        states_.push_back({now_.q, now_.v, std::move(motor_forces)});
+        states_.push_back({tangent_.q, tangent_.v, std::move(motor_forces)});
     }
 
-    // The tangent of the start: it is made consistent, edge rotations are in equilibrium, Maxwell branches are without stress.
+    // Computes the tangent of the start. The motion makes the given start consistent with joints and rigid bodies, chooses edge rotations in
+    // equilibrium and Maxwell branches without stress; all three depend on the inputs.
     void find_start(const MotionState& start) {
         const DofMap& dof_map = model_.dof_map();
         const VectorXd &q = start.q, &v = start.v;
         const LoadParameters load_parameters = input_.load_parameters_at(0, 0.0),
                              tangent = load_tangent(0, 0.0);
-        now_.q = along_.positions;
-        now_.v = along_.velocities;
+        tangent_.q = along_.positions;
+        tangent_.v = along_.velocities;
         if (dof_map.has_reduced_coordinates() &&
-            (derivatives_.values_change() || !now_.q.isZero(0.0) || !now_.v.isZero(0.0))) {
+            (derivatives_.values_change() || !tangent_.q.isZero(0.0) || !tangent_.v.isZero(0.0))) {
             const Index n = q.size();
             const auto made_consistent = [&](double t) {
                 derivatives_.set(t, load_parameters);
@@ -111,58 +114,61 @@ class Forward {
                 return joined({moved, moving});
             };
             const std::array<Index, 1> ends{n};
-            const VectorXd both = at_start_.of(
-                made_consistent, ends,
-                derivatives_.step_along({{along_.length, largest(now_.q)}, {largest(v), largest(now_.v)}}),
-                std::array{model_.extent(), largest(v)}, "the start");
+            const VectorXd both =
+                start_derivative_.of(made_consistent, ends,
+                                     derivatives_.step_along({{along_.length, largest(tangent_.q)},
+                                                              {largest(v), largest(tangent_.v)}}),
+                                     std::array{model_.extent(), largest(v)}, "the start");
             derivatives_.set(0.0, load_parameters);
-            // Nodes that follow vertices are part of what is made consistent; edge rotations and supported nodes stay.
-            now_.q = both.head(n);
-            now_.v = both.tail(n);
+            tangent_.q = both.head(n);
+            tangent_.v = both.tail(n);
         }
         model_.set_angle_branches(input_.start.angle_branches);
         derivatives_.set(0.0, load_parameters);
         if (!input_.rotations_given) {
             const EdgeRotationEquilibrium rotations(model_, q, load_parameters);
             VectorXd forces(q.size());
-            model_.multiply(now_.q, forces);
-            now_.q += rotations.adjoint(forces + derivatives_.energy_gradient(q, load_parameters, tangent));
+            model_.multiply(tangent_.q, forces);
+            tangent_.q +=
+                rotations.adjoint(forces + derivatives_.energy_gradient(q, load_parameters, tangent));
         }
         const bool branches = input_.viscosity.maxwell(), explicit_first = input_.tableau.begins_explicitly;
         if (branches && input_.start.e.empty()) {
             model_.evaluate(q, load_parameters);
-            now_.e.assign(input_.viscosity.branches.size(),
-                          derivatives_.strains(model_.elastic(), q, now_.q, load_parameters, tangent));
+            tangent_.e.assign(
+                input_.viscosity.branches.size(),
+                derivatives_.strains(model_.elastic(), q, tangent_.q, load_parameters, tangent));
         } else if (branches) {
-            now_.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
+            tangent_.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
         }
         if (!explicit_first) return;
-        now_.rates.w = VectorXd::Zero(q.size());
-        if (start.rates.c.size() > 0) now_.rates.c = VectorXd::Zero(q.size());
-        now_.rates.elastic.d = model_.elastic().zeros();
-        now_.rates.elastic.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
+        tangent_.rates.w = VectorXd::Zero(q.size());
+        if (start.rates.c.size() > 0) tangent_.rates.c = VectorXd::Zero(q.size());
+        tangent_.rates.elastic.d = model_.elastic().zeros();
+        tangent_.rates.elastic.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
     }
 
     FreeFlight flight_at(double t, const Tableau& tableau, double dt, double dt_tangent,
                          const MotionState& begin, std::vector<FreeBody>& bodies) const {
         bodies = free_bodies(model_.dof_map(), input_.inertia.mass + t * along_.mass);
-        return FreeFlight(bodies, tableau, dt + t * dt_tangent, begin.q + t * now_.q, begin.v + t * now_.v);
+        return FreeFlight(bodies, tableau, dt + t * dt_tangent, begin.q + t * tangent_.q,
+                          begin.v + t * tangent_.v);
     }
 
     double step_of_flight(double dt, double dt_tangent, const MotionState& begin) const {
-        return derivatives_.step_along({{along_.length, largest(now_.q)},
-                                        {largest(begin.v), largest(now_.v)},
+        return derivatives_.step_along({{along_.length, largest(tangent_.q)},
+                                        {largest(begin.v), largest(tangent_.v)},
                                         {dt, std::abs(dt_tangent)}});
     }
 
-    // Returns the derivatives of what free flight adds to the predictions of all stages.
+    // Returns the derivatives of the terms that free flight adds to the predictions of all stages (FreeFlight::add_defect).
     VectorXd flight_tangent(const StepAlgebra& algebra, double dt_tangent, const MotionState& begin) {
         const int n = algebra.tableau().stages;
         const Index size = model_.size();
         std::vector<Index> ends;
         for (int k = 1; k < 2 * n; ++k) ends.push_back(k * size);
         const std::vector<double> noise(2 * n, model_.extent() + largest(begin.v));
-        return flights_.of(
+        return flight_derivative_.of(
             [&](double t) {
                 std::vector<FreeBody> bodies;
                 const FreeFlight flight =
@@ -179,13 +185,13 @@ class Forward {
             ends, step_of_flight(algebra.dt(), dt_tangent, begin), noise, "a free flight");
     }
 
-    // Continues the rates at the end of a step to those after FreeFlight::finish.
+    // Replaces the tangent of the rates at the end of a step by that after FreeFlight::finish.
     void finish_flight(const StepAlgebra& algebra, double dt_tangent, const MotionState& begin,
                        const VectorXd& q, const StageRates& last, StageRates& tangent,
                        const VectorXd& q_tangent) {
         const Index size = model_.size();
         const std::array<Index, 1> ends{size};
-        const VectorXd both = landings_.of(
+        const VectorXd both = flight_end_derivative_.of(
             [&](double t) {
                 std::vector<FreeBody> bodies;
                 const FreeFlight flight =
@@ -210,32 +216,31 @@ class Forward {
         return forces + weights.cwiseProduct(change);
     }
 
-    // Returns the change of the state that cancels a change of the residual of a stage, while what is prescribed changes; and that
-    // change of the residual. The model was evaluated last at q.
-    // nearby: a factorization made near q, or nullptr.
+    // Returns the change of the state that cancels a change of the residual of a stage, given the change of the prescribed motion. The
+    // model must have been evaluated last at q. nearby: a factorization made near q, or nullptr.
     VectorXd solve(const VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                    const PrescribedTangent& change, VectorXd residual, const Factor* nearby) {
         newton_.watch(0.0);
         const DofMap& dof_map = model_.dof_map();
-        VectorXd all = change.all();
-        if (all.size() == 0) all = VectorXd::Zero(q.size());
-        if (!all.isZero(0.0)) {
+        VectorXd moved = change.motion();
+        if (moved.size() == 0) moved = VectorXd::Zero(q.size());
+        if (!moved.isZero(0.0)) {
             model_.assemble(q, load_parameters, false);
             model_.assemble_forces(load_parameters);
-            VectorXd pull = product(all, *proximal.weights);
-            if (change.driven.size() > 0)
-                dof_map.add_motor_increment_forces(newton_.gradient(q, proximal), change.driven, pull);
+            VectorXd pull = product(moved, *proximal.weights);
+            if (change.by_motors.size() > 0)
+                dof_map.add_motor_increment_forces(newton_.gradient(q, proximal), change.by_motors, pull);
             residual += pull;
         }
         VectorXd reduced = -dof_map.vector(residual);
-        if (change.turned.size() > 0) reduced -= change.turned;
-        if (reduced.isZero(0.0)) return all;
+        if (change.reduced_residual.size() > 0) reduced -= change.reduced_residual;
+        if (reduced.isZero(0.0)) return moved;
         const bool symmetric =
             !model_.capabilities().has_unsymmetric_tangent && !model_.capabilities().has_velocity_forces;
-        if (nearby && symmetric && change.turned.size() == 0) {
+        if (nearby && symmetric && change.reduced_residual.size() == 0) {
             VectorXd solution = -residual;
             if (newton_.solve_gmres_adjoint(q, load_parameters, proximal, *nearby, solution).converged)
-                return all + solution;
+                return moved + solution;
         }
         Eigen::MatrixXd no_moves(q.size(), 0);
         const FactorReport factor = newton_.factorize(q, load_parameters, false, proximal, no_moves);
@@ -253,7 +258,7 @@ class Forward {
         } else {
             newton_.factor()->solve_approximately(reduced, to_round_off.tolerance);
         }
-        return all + dof_map.expand(reduced);
+        return moved + dof_map.expand(reduced);
     }
 
     // Returns a factorization that was made near stage i: that of its last Newton iteration, or that of the stage before, whose inertia is
@@ -285,7 +290,7 @@ class Forward {
         const VectorXd force_tangent = (by_inputs - pull) / stage.contact_factor;
         VectorXd found = dof_map.acceleration(mass, force_tangent - along_.mass.cwiseProduct(c));
         if (!dof_map.has_reduced_coordinates()) return found;
-        found += turns_.of(
+        found += rotation_derivative_.of(
             [&](double t) {
                 derivatives_.set(t, stage.load_parameters + t * stage.tangent);
                 model_.linearize(q + t * q_tangent);
@@ -298,7 +303,7 @@ class Forward {
         return found;
     }
 
-    // Continues the tangent through a substep. Returns that of the motor forces at its end, if it is wanted.
+    // Computes the tangent after a substep from that before it. Returns the tangent of the motor forces at its end if it is wanted.
     VectorXd take(Index step, const Substep& part, const SubstepRecord& record, bool wants_motor_forces) {
         const double fraction = part.fraction(), dt_tangent = fraction * along_.time_steps[step];
         const StepAlgebra algebra = stepper_.algebra(fraction * input_.time_steps[step],
@@ -321,10 +326,10 @@ class Forward {
 
         std::vector<StageRates> tangents;
         if (first) {
-            tangents.push_back(now_.rates);
-            tangents.front().v = now_.v;
+            tangents.push_back(tangent_.rates);
+            tangents.front().v = tangent_.v;
             tangents.front().joints.d =
-                derivatives_.damper_rates(record.begin, now_.q, now_.v, begin, begin_tangent);
+                derivatives_.damper_rates(record.begin, tangent_.q, tangent_.v, begin, begin_tangent);
         }
         ViscousTangent strains(model_.elastic(), input_.viscosity, along_.viscosity, &StageRates::elastic),
             joints(model_.dampers(), damper_law, no_change_, &StageRates::joints);
@@ -332,17 +337,18 @@ class Forward {
         if (!strains.idle())
             strains.begin(
                 algebra, dt_tangent, model_.elastic().strains(record.begin.q),
-                derivatives_.strains(model_.elastic(), record.begin.q, now_.q, begin, begin_tangent),
-                record.begin.e, now_.e, first ? &at.all.front() : nullptr,
+                derivatives_.strains(model_.elastic(), record.begin.q, tangent_.q, begin, begin_tangent),
+                record.begin.e, tangent_.e, first ? &at.all.front() : nullptr,
                 first ? &tangents.front() : nullptr);
         if (!joints.idle())
-            joints.begin(algebra, dt_tangent, model_.dampers().strains(record.begin.q),
-                         derivatives_.strains(model_.dampers(), record.begin.q, now_.q, begin, begin_tangent),
-                         {}, {}, first ? &at.all.front() : nullptr, first ? &tangents.front() : nullptr);
+            joints.begin(
+                algebra, dt_tangent, model_.dampers().strains(record.begin.q),
+                derivatives_.strains(model_.dampers(), record.begin.q, tangent_.q, begin, begin_tangent), {},
+                {}, first ? &at.all.front() : nullptr, first ? &tangents.front() : nullptr);
 
         VectorXd q_tangent, motor_forces;
         for (int i = 0; i < n; ++i) {
-            VectorXd x_hat_tangent = now_.q, v_hat_tangent = now_.v;
+            VectorXd x_hat_tangent = tangent_.q, v_hat_tangent = tangent_.v;
             for (std::size_t j = 0; j < tangents.size(); ++j) {
                 const double a = tableau.a[i][j];
                 x_hat_tangent += a * (dt * tangents[j].v + dt_tangent * at.all[j].v);
@@ -369,7 +375,7 @@ class Forward {
                                      load_tangent(step, place),
                                      begin,
                                      begin_tangent,
-                                     now_.q};
+                                     tangent_.q};
             const VectorXd& q = record.stages[i].q;
             const VectorXd& v = at.all[first + i].v;
             const VectorXd w = algebra.stage_acceleration(at.all[first + i], at.v_hat[i]);
@@ -412,16 +418,16 @@ class Forward {
             finish_flight(algebra, dt_tangent, record.begin, record.stages.back().q, at.all.back(), last,
                           q_tangent);
         if (model_.dof_map().has_motors()) {
-            v_before_ = now_.v;
+            v_before_ = tangent_.v;
             dt_before_tangent_ = dt_tangent;
         }
-        now_.q = std::move(q_tangent);
-        now_.v = last.v;
+        tangent_.q = std::move(q_tangent);
+        tangent_.v = last.v;
         if (!strains.idle()) {
-            now_.e = strains.e_tangent();
+            tangent_.e = strains.e_tangent();
             last.elastic = strains.rates_tangent();
         }
-        now_.rates = std::move(last);
+        tangent_.rates = std::move(last);
         return motor_forces;
     }
 
@@ -456,12 +462,12 @@ class Forward {
             if (end.is_first_step()) {
                 change = end.contact_weight() * rates_tangent.c;
             } else {
-                // The acceleration is of degree -1 in the lengths of this substep and the one before.
+                // The acceleration is homogeneous of degree -1 in the lengths of this substep and the one before.
                 const VectorXd w = algebra.stage_acceleration(at.all.back(), v_hat);
                 const VectorXd by_dt =
                     -(end.acceleration_change() + w + begin.dt_before * end.change_by_dt_before()) /
                     algebra.dt();
-                change = end.weight_last() * rates_tangent.v + end.weight_begin() * now_.v +
+                change = end.weight_last() * rates_tangent.v + end.weight_begin() * tangent_.v +
                          end.weight_before() * v_before_ + dt_tangent * by_dt +
                          dt_before_tangent_ * end.change_by_dt_before() -
                          (rates_tangent.v - v_hat_tangent - stage.T_tangent * w) / stage.T;
@@ -476,7 +482,7 @@ class Forward {
         model_.assemble(q, stage.load_parameters, false);
         model_.assemble_forces(stage.load_parameters);
         VectorXd found = dof_map.motor_forces(residual + product(q_tangent, *proximal.weights));
-        found += motors_.of(
+        found += motor_derivative_.of(
             [&](double t) {
                 derivatives_.set(t, stage.load_parameters + t * stage.tangent);
                 model_.linearize(q + t * q_tangent);
@@ -495,19 +501,20 @@ class Forward {
     Stepper stepper_;
     MotionDerivatives derivatives_;
     const Viscosity no_change_{0.0, {}, 0.0};
-    MotionState now_;    // the tangent of the present state
-    VectorXd v_before_;  // as MotionState::v_before
+    MotionState tangent_;  // of the current state
+    VectorXd v_before_;    // as MotionState::v_before
     double dt_before_tangent_ = 0.0;
     std::vector<MotionTangent::State> states_;
-    DirectionalDerivative at_start_, flights_, landings_, turns_, motors_;
+    DirectionalDerivative start_derivative_, flight_derivative_, flight_end_derivative_, rotation_derivative_,
+        motor_derivative_;
     double progress_ = 0.0;
     bool factorized_here_ = false;  // whether the factorization of newton_ is of this substep
 };
 
-// Follows a motion with its tangent until that cannot be computed. The motion goes on in any case.
-class Following final : public MotionFollower {
+// Computes the tangent beside a motion, until that is impossible; the motion itself continues.
+class TangentFollower final : public MotionFollower {
   public:
-    Following(Forward& forward, std::string& refusal) : forward_(forward), refusal_(refusal) {}
+    TangentFollower(ForwardSweep& forward, std::string& refusal) : forward_(forward), refusal_(refusal) {}
 
     void begin(const MotionState& start) override {
         attempt([&] { forward_.begin(start); });
@@ -528,7 +535,7 @@ class Following final : public MotionFollower {
         }
     }
 
-    Forward& forward_;
+    ForwardSweep& forward_;
     std::string& refusal_;
 };
 
@@ -540,11 +547,11 @@ MotionTangent motion_jvp(Model& model, const MotionInput& input, const MotionRes
         throw InvalidInput("the motion has no stored states: it was computed without gradients");
     const ScopedValues values_afterwards(model.parameters(), values);
     const ScopedTimeVarying varying(model.parameters(), input.varying);
-    const Forward* running = nullptr;
+    const ForwardSweep* running = nullptr;
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(running ? running->progress() : 0.0, residual);
     });
-    Forward forward(newton, input, values, along);
+    ForwardSweep forward(newton, input, values, along);
     running = &forward;
     return forward.run(motion);
 }
@@ -553,14 +560,14 @@ MotionWithTangent simulate_with_tangent(Model& model, const MotionInput& input,
                                         const AdjointStorageOptions& keep, const VectorXd& values,
                                         const MotionInputTangent& along, const MotionWatch& watch) {
     const ScopedValues values_afterwards(model.parameters(), values);
-    const Forward* running = nullptr;
+    const ForwardSweep* running = nullptr;
     Newton newton(model, input.newton, [&](double residual) {
         if (watch) watch(running ? running->progress() : 0.0, residual);
     });
-    Forward forward(newton, input, values, along);
+    ForwardSweep forward(newton, input, values, along);
     running = &forward;
     MotionWithTangent found;
-    Following following(forward, found.refusal);
+    TangentFollower following(forward, found.refusal);
     found.motion = simulate(model, input, keep, watch, &following);
     if (found.refusal.empty() && found.motion.outcome == Outcome::converged)
         found.tangent = forward.finish(found.motion);

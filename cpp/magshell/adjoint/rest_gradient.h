@@ -1,5 +1,5 @@
-// RestGradient: the gradient of a loss by rest positions, as far as the core computes it: through the shape of bodies at rest, and through what
-// supports prescribe. The caller adds what follows from the other gradients.
+// RestGradient: the gradient of a loss by rest positions, as far as the core computes it: through the shape of bodies at rest, and through
+// what supports prescribe. The caller adds what follows from the other gradients.
 #pragma once
 
 #include "magshell/scene/rest_gradient.h"
@@ -37,8 +37,8 @@ struct RestGradient {
         const Index first = model.nodes().n_coordinates(), count = by_nodes.size() - first;
         by_nodes.tail(count) += by_q.segment(first, count);
     }
-    /// Adds the part of a gradient by all dofs that is by those that supports prescribe, and by those that ties and rigid bodies move.
-    /// Arguments as in DofMap::vjp.
+    /// Adds the part of a gradient with respect to all dofs that is by those that supports prescribe, and by those that ties and rigid
+    /// bodies move. Arguments as in DofMap::vjp.
     void add_constrained(const DofMap& dof_map, const VectorXd& by_q, const VectorXd& lambda,
                          const VectorXd& gradient, const VectorXd& by_motor_forces = {}) {
         if (!asked) return;

@@ -101,7 +101,8 @@ void ViscousAdjoint::add_stress_gradient(int i, const StrainSet& d, const Vector
     }
 }
 
-// Distributes the gradients by d^_i = d + dt sum a_ij d'_j, and by e^_i. The part of the start of the step is complete after all stages.
+// Distributes the gradients with respect to d^_i = d + dt sum a_ij d'_j, and to e^_i. The part of the start of the step is complete after
+// all stages.
 void ViscousAdjoint::pass_on(int i) {
     const std::size_t branches = law_.branches.size();
     by_d_begin.add(1.0, by_d_hat_[i]);

@@ -5,7 +5,8 @@
 
 namespace magshell {
 
-/// The gradient by the Maxwell strains between two steps, and by the rates of the strains there; empty if nothing depends on them.
+/// The gradient with respect to the Maxwell strains between two steps, and to the rates of the strains there; empty if nothing depends on
+/// them.
 struct ViscousGradient {
     StrainSet d_rate;
     MaxwellStrains e, e_rate;
@@ -13,18 +14,18 @@ struct ViscousGradient {
 
 class ViscousAdjoint {
   public:
-    /// Recomputes the strains of the stages. kind: selects the rates of `terms`. by_end: gradient by the end of the step, from later
-    /// steps. load_parameters: load parameters at the beginning of the step and at its stages.
+    /// Recomputes the strains of the stages. kind: selects the rates of `terms`. by_end: gradient with respect to the end of the step, from
+    /// later steps. load_parameters: load parameters at the beginning of the step and at its stages.
     ViscousAdjoint(Model& model, ViscousTerms& terms, const Viscosity& law, ViscousStage::Kind kind,
                    const StepAlgebra& step, const SubstepRecord& substep,
                    std::span<const LoadParameters> load_parameters, const ViscousGradient& by_end);
 
     /// Sets the strain history of stage i in the terms.
     void set_history(int i) const;
-    /// Adds to by_q, and to the parameters of `scene`, the gradients by the strains of the evaluated stage i through later rates, and returns
-    /// the gradient by these strains; it is empty without viscosity.
+    /// Adds to by_q, and to the parameters of `scene`, the gradients with respect to the strains of the evaluated stage i through later
+    /// rates, and returns the gradient with respect to these strains; it is empty without viscosity.
     StrainSet before_solve(int i, VectorXd& by_q, Gradient& scene);
-    /// Adds the contribution of lambda at the evaluated stage i to the gradients by the history and by the law.
+    /// Adds the contribution of lambda at the evaluated stage i to the gradients with respect to the history and to the law.
     void after_solve(int i, const VectorXd& lambda);
     /// Adds the same for a nearby state with the history of stage i; it must be called before after_solve(i).
     void at_nearby_state(int i, const VectorXd& q, const VectorXd& lambda);

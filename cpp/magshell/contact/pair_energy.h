@@ -77,7 +77,7 @@ class PairEnergy {
     /// Computes the Hessian's blocks between the pair's nodes.
     void hessian(bool project_psd, PairBlocks& blocks) const;
 
-    /// The gradient by the law of lambda . gradient plus a function of the normal force, whose derivative is
+    /// The gradient with respect to the law of lambda . gradient plus a function of the normal force, whose derivative is
     /// `by_normal_force`.
     struct ByLaw {
         double stiffness = 0.0, reach = 0.0, thickness = 0.0, smoothing = 0.0;
@@ -92,12 +92,13 @@ class PairEnergy {
 
   private:
     void add_parallel(bool project_psd, PairBlocks& blocks) const;
-    /// The rates along lambda of the distance d, to which a change of the normal force counts as well, and of c in contact/parallel_edges.h.
+    /// The rates along lambda of the distance d, to which a change of the normal force counts as well, and of c in
+    /// contact/parallel_edges.h.
     struct Rates {
         double distance = 0.0, parallel = 0.0;
     };
     Rates rates(const PairVectors& lambda, double by_normal_force) const;
-    /// Returns the gradient by the scaled law of the pair.
+    /// Returns the gradient with respect to the scaled law of the pair.
     ByLaw vjp_of_own_law(const Rates& rates) const;
 
     ContactPair pair_;

@@ -12,7 +12,7 @@
 
 namespace magshell {
 
-/// m and its derivatives by the edges a and b; those by nodes are the same with the signs - + - +.
+/// m and its derivatives with respect to the edges a and b; those with respect to nodes are the same with the signs - + - +.
 struct ParallelEdges {
     double factor = 1.0;             // m
     bool acts = false;               // true if the derivatives are not zero

@@ -17,29 +17,29 @@ namespace {
 // The frames of rotated nodes, and those of all others, which are the world axes.
 struct Frames {
     const std::vector<Index>& frame_of;
-    const std::vector<PrescribedNode>& held;
+    const std::vector<PrescribedNode>& prescribed;
 
-    // Returns a vector of all dofs with the rotated nodes along their frames, and back.
+    // Returns a vector of all dofs with the components of rotated nodes along their frames; out_of() does the reverse.
     VectorXd into(const VectorXd& full) const {
         VectorXd local = full;
         for (Index node = 0; node < static_cast<Index>(frame_of.size()); ++node)
             if (frame_of[node] >= 0)
                 local.segment<3>(3 * node) =
-                    held[frame_of[node]].frame.transpose() * full.segment<3>(3 * node);
+                    prescribed[frame_of[node]].frame.transpose() * full.segment<3>(3 * node);
         return local;
     }
     void out_of(VectorXd& local) const {
         for (Index node = 0; node < static_cast<Index>(frame_of.size()); ++node)
             if (frame_of[node] >= 0) {
                 const Vec3 own = local.segment<3>(3 * node);
-                local.segment<3>(3 * node) = held[frame_of[node]].frame * own;
+                local.segment<3>(3 * node) = prescribed[frame_of[node]].frame * own;
             }
     }
-    // Returns the direction along which a dof of a node counts.
+    // Returns the direction of a dof: an axis of the frame of its node, or of the world.
     Vec3 direction(Index dof) const {
         const Index node = dof / 3;
         const bool rotated = !frame_of.empty() && frame_of[node] >= 0;
-        return rotated ? Vec3(held[frame_of[node]].frame.col(dof % 3)) : Vec3(Vec3::Unit(dof % 3));
+        return rotated ? Vec3(prescribed[frame_of[node]].frame.col(dof % 3)) : Vec3(Vec3::Unit(dof % 3));
     }
 };
 
@@ -49,9 +49,9 @@ const LinearTies* ties_of(const std::unique_ptr<ReducedAssembly>& reduced) {
 
 }  // namespace
 
-DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> held, const Nodes& nodes, Index moves,
-               Registry& registry, ReducedCoordinatesList reduced)
-    : held_(std::move(held)), nodes_(nodes), moves_(moves), full_size_(matrix.size()) {
+DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> prescribed, const Nodes& nodes,
+               Index moves, Registry& registry, ReducedCoordinatesList reduced)
+    : prescribed_(std::move(prescribed)), nodes_(nodes), moves_(moves), full_size_(matrix.size()) {
     support_factor_ = registry.load_parameters.add("scene", "support_factor", "1", 1, 1);
     for (Index k = 0; k < moves; ++k) {
         const std::string owner = "move " + std::to_string(k);
@@ -59,30 +59,30 @@ DofMap::DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> held, con
                            registry.values.add(owner, "rotation", "rad", 1, 3),
                            registry.values.add(owner, "displacement", "m", 1, 3)});
     }
-    std::vector<char> is_held(matrix.size(), 0);
-    held_at_.assign(matrix.nodes(), -1);
-    for (Index k = 0; k < static_cast<Index>(held_.size()); ++k) {
-        const PrescribedNode& h = held_[k];
-        held_at_[h.node] = k;
+    std::vector<char> is_prescribed(matrix.size(), 0);
+    prescribed_at_.assign(matrix.nodes(), -1);
+    for (Index k = 0; k < static_cast<Index>(prescribed_.size()); ++k) {
+        const PrescribedNode& h = prescribed_[k];
+        prescribed_at_[h.node] = k;
         if (h.n_prescribed == 3 || axis_aligned(h)) {
             for (int axis = 0; axis < h.n_prescribed; ++axis) {
                 Index component;
                 h.frame.col(axis).cwiseAbs().maxCoeff(&component);
-                is_held[3 * h.node + (h.n_prescribed == 3 ? axis : component)] = 1;
+                is_prescribed[3 * h.node + (h.n_prescribed == 3 ? axis : component)] = 1;
             }
             continue;
         }
         if (frame_of_.empty()) frame_of_.assign(matrix.nodes(), -1);
         frame_of_[h.node] = k;
-        for (int axis = 0; axis < h.n_prescribed; ++axis) is_held[3 * h.node + axis] = 1;
+        for (int axis = 0; axis < h.n_prescribed; ++axis) is_prescribed[3 * h.node + axis] = 1;
     }
 
     if (!reduced.empty()) reduced_ = std::make_unique<ReducedAssembly>(std::move(reduced), matrix);
     if (const LinearTies* ties = ties_of(reduced_))
         for (const TiedDof& each : ties->tied())
-            if (is_held[each.dof]) throw InvalidInput("a dof is tied that a support holds");
+            if (is_prescribed[each.dof]) throw InvalidInput("a dof is tied that a support holds");
     for (Index u = 0; u < matrix.size(); ++u)
-        if (!is_held[u] && !(reduced_ && reduced_->is_reduced(u))) free_unknowns_.push_back(u);
+        if (!is_prescribed[u] && !(reduced_ && reduced_->is_reduced(u))) free_dofs_.push_back(u);
     if (reduced_) reduced_->linearize(rest_state(nodes));
     set_pattern(matrix, nullptr);
 }
@@ -96,8 +96,8 @@ void DofMap::Pieces::add(Index from, Index to) {
 
 void DofMap::set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer) {
     std::vector<Index> reduced(full_size_, -1);
-    const Index free = static_cast<Index>(free_unknowns_.size());
-    for (Index k = 0; k < free; ++k) reduced[free_unknowns_[k]] = k;
+    const Index free = static_cast<Index>(free_dofs_.size());
+    for (Index k = 0; k < free; ++k) reduced[free_dofs_[k]] = k;
     std::vector<const SystemMatrix*> matrices = {&matrix};
     if (layer) matrices.push_back(layer);
     pieces_.all.clear();
@@ -110,7 +110,7 @@ void DofMap::set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer) 
     pattern.column_starts.push_back(0);
     const LinearTies* ties = ties_of(reduced_);
     const std::set<Index> none;
-    for (const Index u : free_unknowns_) {
+    for (const Index u : free_dofs_) {
         const std::set<Index>& of_ties = ties ? ties->rows_of(reduced[u], none) : none;
         auto next = of_ties.begin();
         each_entry(matrix, layer, u, [&](Index unknown, Index k, Index l) {
@@ -131,7 +131,7 @@ void DofMap::set_pattern(const SystemMatrix& matrix, const SystemMatrix* layer) 
         reduced_->append_columns(pattern);
         reduced_->find_entries(matrices, reduced, pattern);
     }
-    std::shared_ptr<const SparsePattern>& last = layer ? coupled_ : alone_;
+    std::shared_ptr<const SparsePattern>& last = layer ? with_layer_ : without_layer_;
     if (!last || *last != pattern) last = std::make_shared<const SparsePattern>(std::move(pattern));
     pattern_ = last;
 }
@@ -157,20 +157,20 @@ void DofMap::set_values(const Values& values) {
 VectorXd DofMap::prescribed_increment(const VectorXd& q, const LoadParameters& load_parameters) const {
     VectorXd increment = VectorXd::Zero(q.size());
     const double t = support_factor(load_parameters);
-    for (const PrescribedNode& h : held_)
-        increment.segment<3>(3 * h.node) = held_part(
+    for (const PrescribedNode& h : prescribed_)
+        increment.segment<3>(3 * h.node) = prescribed_part(
             h, [&](Index move) -> Vec3 { return position(h.node, move, t) - q.segment<3>(3 * h.node); });
     if (has_motors()) reduced_->add_motor_increment(q, increment);
     const LinearTies* ties = ties_of(reduced_);
     if (!ties) return increment;
 
-    // A displacement is known to the round-off of the coordinates that it is a difference of.
+    // A displacement is the difference of two positions, and has their round-off.
     const auto round_off = [&](Index dof) {
         const Index node = dof / 3;
         return 2.0 * std::numeric_limits<double>::epsilon() *
                (q.segment<3>(3 * node).norm() + nodes_.rest[node].norm());
     };
-    const Frames frames{frame_of_, held_};
+    const Frames frames{frame_of_, prescribed_};
     const VectorXd motion = frames.into(q + increment - rest_state(nodes_));
     VectorXd gaps = VectorXd::Zero(q.size());
     for (const TiedDof& each : ties->tied()) {
@@ -189,34 +189,34 @@ VectorXd DofMap::prescribed_increment(const VectorXd& q, const LoadParameters& l
 
 VectorXd DofMap::along_supports(const VectorXd& full) const {
     const LinearTies* ties = ties_of(reduced_);
-    VectorXd parts(3 * (held_.size() + (ties ? ties->tied().size() : 0))), passed_on = full;
+    VectorXd parts(3 * (prescribed_.size() + (ties ? ties->tied().size() : 0))), on_others = full;
     if (ties) {
-        const Frames frames{frame_of_, held_};
-        passed_on = frames.into(full);
-        Index row = 3 * static_cast<Index>(held_.size());
+        const Frames frames{frame_of_, prescribed_};
+        on_others = frames.into(full);
+        Index row = 3 * static_cast<Index>(prescribed_.size());
         for (const TiedDof& each : ties->tied()) {
-            parts.segment<3>(row) = frames.direction(each.dof) * passed_on[each.dof];
+            parts.segment<3>(row) = frames.direction(each.dof) * on_others[each.dof];
             row += 3;
         }
-        ties->gather(passed_on);
-        frames.out_of(passed_on);
+        ties->gather(on_others);
+        frames.out_of(on_others);
     }
-    for (std::size_t k = 0; k < held_.size(); ++k)
-        parts.segment<3>(3 * static_cast<Index>(k)) =
-            held_part(held_[k], [&](Index) -> Vec3 { return passed_on.segment<3>(3 * held_[k].node); });
+    for (std::size_t k = 0; k < prescribed_.size(); ++k)
+        parts.segment<3>(3 * static_cast<Index>(k)) = prescribed_part(
+            prescribed_[k], [&](Index) -> Vec3 { return on_others.segment<3>(3 * prescribed_[k].node); });
     return parts;
 }
 
 Mat3 DofMap::free_motions(Index node) const {
     Mat3 free = Mat3::Identity();
-    if (held_at_[node] < 0) return free;
-    const PrescribedNode& h = held_[held_at_[node]];
+    if (prescribed_at_[node] < 0) return free;
+    const PrescribedNode& h = prescribed_[prescribed_at_[node]];
     for (int axis = 0; axis < h.n_prescribed; ++axis)
         free -= h.frame.col(axis) * h.frame.col(axis).transpose();
     return h.n_prescribed == 3 ? Mat3(Mat3::Zero()) : free;
 }
 
-// At two nodes of one symmetry plane, the block has no free part but round-off.
+// Between two nodes of one symmetry plane, the free part of the block is zero up to round-off.
 bool DofMap::acts_on_free_motion(Index a, Index b, const Vec3& axis) const {
     // [-] of the axis; see test_quarter_with_symmetry_planes_equals_the_full_dome
     constexpr double round_off = 1e-10;
@@ -228,10 +228,10 @@ bool DofMap::acts_on_free_motion(Index a, Index b, const Vec3& axis) const {
 VectorXd DofMap::prescribed_rate(const LoadParameters& load_parameters) const {
     VectorXd out = VectorXd::Zero(full_size_);
     const double t = support_factor(load_parameters);
-    for (const PrescribedNode& h : held_)
-        out.segment<3>(3 * h.node) = held_part(h, [&](Index move) { return rate(h.node, move, t); });
+    for (const PrescribedNode& h : prescribed_)
+        out.segment<3>(3 * h.node) = prescribed_part(h, [&](Index move) { return rate(h.node, move, t); });
     if (const LinearTies* ties = ties_of(reduced_)) {
-        const Frames frames{frame_of_, held_};
+        const Frames frames{frame_of_, prescribed_};
         out = frames.into(out);
         ties->extend(out);
         for (const TiedDof& each : ties->tied())
@@ -262,26 +262,26 @@ void DofMap::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorX
     if (reduced_) reduced_->vjp(by_state, lambda, gradient, by_motor_forces, out);
     const double t = support_factor(load_parameters);
     std::vector<SupportMove> by_move(moves_.size());
-    VectorXd by_held = by_state;
+    VectorXd by_prescribed = by_state;
     if (const LinearTies* ties = ties_of(reduced_)) {
-        const Frames frames{frame_of_, held_};
-        by_held = frames.into(by_state);
+        const Frames frames{frame_of_, prescribed_};
+        by_prescribed = frames.into(by_state);
         for (const TiedDof& each : ties->tied())
             for (const TiedDof::Move& move : each.moves) {
-                const double by_displacement = move.weight * by_held[each.dof];
+                const double by_displacement = move.weight * by_prescribed[each.dof];
                 by_move[move.move].translation[move.axis] += t * by_displacement;
                 out.load_parameters[support_factor_.first] +=
                     moves_[move.move].translation[move.axis] * by_displacement;
             }
-        ties->gather(by_held);
-        frames.out_of(by_held);
+        ties->gather(by_prescribed);
+        frames.out_of(by_prescribed);
     }
-    for (const PrescribedNode& h : held_)
+    for (const PrescribedNode& h : prescribed_)
         for (int axis = 0; axis < h.n_prescribed; ++axis) {
             const Index move = h.moves[axis];
             if (move < 0) continue;
             const Vec3 along = h.frame.col(axis),
-                       by_position = along * along.dot(by_held.segment<3>(3 * h.node));
+                       by_position = along * along.dot(by_prescribed.segment<3>(3 * h.node));
             const Vec3& rest = nodes_.rest[h.node];
             if (h.node < nodes_.n_vertices())
                 moves_[move].point_vjp(rest, t, by_position, by_move[move]);
@@ -302,7 +302,7 @@ void DofMap::rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const Ve
     reduced_->rest_vjp(by_state, lambda, gradient, by_motor_forces, by_nodes);
     const LinearTies* ties = ties_of(reduced_);
     if (!ties) return;
-    const Frames frames{frame_of_, held_};
+    const Frames frames{frame_of_, prescribed_};
     VectorXd by_rest = VectorXd::Zero(full_size_);
     ties->add_rest_gradient(frames.into(by_state), by_rest);
     frames.out_of(by_rest);
@@ -318,7 +318,7 @@ double DofMap::largest_rotation() const {
 // Rotates B_ij -> Q_i^T B_ij Q_j if node i or j is rotated. The rows of a node's three columns are stored as system_matrix.h says.
 void DofMap::rotate_blocks(SystemMatrix& full) const {
     const Index rotations_from = 3 * full.nodes();
-    const auto frame = [&](Index node) -> const Mat3& { return held_[frame_of_[node]].frame; };
+    const auto frame = [&](Index node) -> const Mat3& { return prescribed_[frame_of_[node]].frame; };
     for (Index j = 0; j < full.nodes(); ++j) {
         const Index length = full.column_length(j);
         const Index start = full.column_starts()[3 * j];
@@ -376,18 +376,18 @@ void DofMap::matrix(SystemMatrix& full, SystemMatrix* layer, LargeVector<double>
 }
 
 void DofMap::add_weights(const VectorXd& full, LargeVector<double>& values) const {
-    for (std::size_t k = 0; k < free_unknowns_.size(); ++k)
-        values[pattern_->column_starts[k]] += full[free_unknowns_[k]];
+    for (std::size_t k = 0; k < free_dofs_.size(); ++k)
+        values[pattern_->column_starts[k]] += full[free_dofs_[k]];
     if (reduced_) reduced_->add_weights(full, values.data());
 }
 
 VectorXd DofMap::vector(const VectorXd& full) const {
-    return frame_of_.empty() ? gathered(full) : gathered(Frames{frame_of_, held_}.into(full));
+    return frame_of_.empty() ? gathered(full) : gathered(Frames{frame_of_, prescribed_}.into(full));
 }
 
 VectorXd DofMap::gathered(const VectorXd& full) const {
     VectorXd reduced(size());
-    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) reduced[k] = full[free_unknowns_[k]];
+    for (std::size_t k = 0; k < free_dofs_.size(); ++k) reduced[k] = full[free_dofs_[k]];
     if (reduced_) reduced_->pull_back(full, reduced);
     return reduced;
 }
@@ -399,22 +399,22 @@ VectorXd DofMap::project(const VectorXd& full) const {
         ties->solve(VectorXd::Ones(full_size_), forces, reduced);
         return expand(reduced);
     }
-    VectorXd own = expand(reduced);
-    if (!reduced_) return own;
-    VectorXd carried = full;
-    reduced_->project(carried);
-    reduced_->replace(carried, own);
-    return own;
+    VectorXd projected = expand(reduced);
+    if (!reduced_) return projected;
+    VectorXd on_bodies = full;
+    reduced_->project(on_bodies);
+    reduced_->replace(on_bodies, projected);
+    return projected;
 }
 
 VectorXd DofMap::acceleration(const VectorXd& mass, const VectorXd& force) const {
     const VectorXd forces = vector(force);
     VectorXd reduced = forces;
-    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) {
-        const double m = mass[free_unknowns_[k]];
+    for (std::size_t k = 0; k < free_dofs_.size(); ++k) {
+        const double m = mass[free_dofs_[k]];
         reduced[static_cast<Index>(k)] = m != 0.0 ? reduced[static_cast<Index>(k)] / m : 0.0;
     }
-    reduced.tail(reduced.size() - static_cast<Index>(free_unknowns_.size())).setZero();
+    reduced.tail(reduced.size() - static_cast<Index>(free_dofs_.size())).setZero();
     if (const LinearTies* ties = ties_of(reduced_)) ties->solve(mass, forces, reduced);
     VectorXd full = expand(reduced);
     if (reduced_) reduced_->accelerate(mass, force, full);
@@ -430,30 +430,30 @@ void DofMap::retract(VectorXd& q, const VectorXd& p) const {
 
 VectorXd DofMap::weights(const VectorXd& full) const {
     VectorXd reduced(size());
-    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) reduced[k] = full[free_unknowns_[k]];
+    for (std::size_t k = 0; k < free_dofs_.size(); ++k) reduced[k] = full[free_dofs_[k]];
     if (reduced_) reduced_->diagonal(full, reduced);
     return reduced;
 }
 
 std::vector<Vec3> DofMap::free(const std::vector<Vec3>& full) const {
     std::vector<Vec3> points;
-    points.reserve(free_unknowns_.size());
-    for (const Index unknown : free_unknowns_) points.push_back(full[unknown]);
+    points.reserve(free_dofs_.size());
+    for (const Index unknown : free_dofs_) points.push_back(full[unknown]);
     if (reduced_) reduced_->append_points(full, points);
     return points;
 }
 
 VectorXd DofMap::expand(const VectorXd& reduced) const {
     VectorXd full = VectorXd::Zero(full_size_);
-    for (std::size_t k = 0; k < free_unknowns_.size(); ++k) full[free_unknowns_[k]] = reduced[k];
+    for (std::size_t k = 0; k < free_dofs_.size(); ++k) full[free_dofs_[k]] = reduced[k];
     if (reduced_) reduced_->push_forward(reduced, full);
-    if (!frame_of_.empty()) Frames{frame_of_, held_}.out_of(full);
+    if (!frame_of_.empty()) Frames{frame_of_, prescribed_}.out_of(full);
     return full;
 }
 
 std::size_t DofMap::bytes() const {
     return (pieces_.all.capacity() + layer_pieces_.all.capacity()) * sizeof(Pieces::Piece) +
-           (frame_of_.capacity() + held_at_.capacity() + free_unknowns_.capacity() +
+           (frame_of_.capacity() + prescribed_at_.capacity() + free_dofs_.capacity() +
             pattern_->rows.capacity() + pattern_->column_starts.capacity()) *
                sizeof(Index) +
            (reduced_ ? reduced_->bytes() : 0);
@@ -466,7 +466,7 @@ bool DofMap::has_motors() const {
 }
 
 bool DofMap::has_values() const {
-    return moves() || (reduced_ && reduced_->has_joint_parameters());
+    return has_prescribed_motion() || (reduced_ && reduced_->has_joint_parameters());
 }
 
 void DofMap::add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move,

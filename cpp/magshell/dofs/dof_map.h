@@ -1,5 +1,5 @@
-// The map from all dofs to the free ones: supports prescribe nodes along some directions and may move them as rigid bodies, and reduced
-// coordinates replace the nodes of rigid bodies and skeletons; these are the last of the free dofs.
+// The map between all dofs of a scene and its free ones, which solvers work with. Supports prescribe nodes along some directions and may
+// move them as rigid bodies. Reduced coordinates replace the nodes of rigid bodies and skeletons; they are the last of the free dofs.
 //
 // A node that is prescribed along directions other than x, y, z is rotated into a frame of its own, in which it is prescribed along the
 // first one or two axes. Nodes without supports cost nothing here.
@@ -22,8 +22,8 @@ class ReducedCoordinates;
 class RigidNodes;
 using ReducedCoordinatesList = std::vector<std::unique_ptr<ReducedCoordinates>>;
 
-/// A node and the orthonormal directions along which it is prescribed, the first n_prescribed columns of `frame`; each direction follows the
-/// move of one support, or stays if that is -1.
+/// A node and the orthonormal directions along which it is prescribed, the first n_prescribed columns of `frame`; each direction follows
+/// the move of one support, or stays if that is -1.
 struct PrescribedNode {
     Index node;
     int n_prescribed;
@@ -33,7 +33,8 @@ struct PrescribedNode {
 
 class DofMap {
   public:
-    /// moves: number of support moves that `held` refers to. The nodes must outlive it. No node may be both prescribed and reduced.
+    /// moves: number of support moves that `prescribed` refers to. The nodes must outlive the map. No node may be both prescribed and
+    /// reduced.
     DofMap(const SystemMatrix& matrix, std::vector<PrescribedNode> prescribed, const Nodes& nodes,
            Index moves, Registry& registry, ReducedCoordinatesList reduced);
     ~DofMap();
@@ -41,15 +42,16 @@ class DofMap {
     DofMap& operator=(const DofMap&) = delete;
 
     void set_values(const Values& values);
-    bool moves() const { return !moves_.empty() || has_motors(); }
+    /// Returns true if supports or motors can move.
+    bool has_prescribed_motion() const { return !moves_.empty() || has_motors(); }
     /// Returns true if motors prescribe coordinates of skeletons.
     bool has_motors() const;
-    /// Returns true if parameters act through it, so that vjp adds gradients by them.
+    /// Returns true if vjp adds gradients with respect to parameters: of support moves, motors or joints.
     bool has_values() const;
 
     /// The free dofs that are not reduced coordinates, ascending; they come first in the reduced order. Those of a rotated node count
     /// along its frame.
-    const std::vector<Index>& free_dofs() const { return free_unknowns_; }
+    const std::vector<Index>& free_dofs() const { return free_dofs_; }
     bool is_rotated(Index node) const { return !frame_of_.empty() && frame_of_[node] >= 0; }
 
     /// Returns the amplitude of the prescribed support moves: 0 at rest, 1 at their end.
@@ -69,14 +71,14 @@ class DofMap {
     /// Returns d(prescribed positions of supports)/d(support factor).
     VectorXd prescribed_rate(const LoadParameters& load_parameters) const;
 
-    /// Adds the gradients by the support moves, the support factor, motors and joint parameters. by_state: gradient by the prescribed
-    /// positions. lambda: adjoint. gradient: of the energy, with inertia in a motion. by_motor_forces: gradient by the motor forces, empty if
-    /// none; by_state includes its contribution through the state.
+    /// Adds the gradients with respect to the support moves, the support factor, motors and joint parameters. by_state: gradient with
+    /// respect to the prescribed positions. lambda: adjoint. gradient: of the energy, with inertia in a motion. by_motor_forces: gradient
+    /// with respect to the motor forces, empty if none; by_state includes its contribution through the state.
     void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
              const LoadParameters& load_parameters, Gradient& out,
              const VectorXd& by_motor_forces = {}) const;
-    /// Adds the gradient by the rest positions of nodes that ties of displacements or rigid bodies move, three numbers per node; arguments
-    /// as in vjp.
+    /// Adds the gradient with respect to the rest positions of nodes that ties of displacements or rigid bodies move, three numbers per
+    /// node; arguments as in vjp.
     void rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
                   const VectorXd& by_motor_forces, VectorXd& by_nodes) const;
     /// Adds to the forces K p of a prescribed increment those due to the curved paths of motor-driven nodes.
@@ -91,11 +93,11 @@ class DofMap {
                                 VectorXd& forces) const;
 
     /// Returns true if there are supports.
-    bool has_supports() const { return !held_.empty(); }
+    bool has_supports() const { return !prescribed_.empty(); }
     /// Returns the part of a vector of all dofs along the prescribed directions, three numbers per prescribed node in the order given.
     VectorXd along_supports(const VectorXd& full) const;
 
-    /// Returns true if the block [axis]x between two nodes acts on their free motions.
+    /// Returns true if the block [axis]x, the matrix of a cross product, between two nodes acts on their free motions.
     bool acts_on_free_motion(Index a, Index b, const Vec3& axis) const;
 
     /// Returns the largest total rotation of a support [rad].
@@ -117,15 +119,15 @@ class DofMap {
     void add_curvature_product(const VectorXd& gradient, const VectorXd& reduced, VectorXd& out) const;
     /// Returns the free part of a vector of all dofs, B^T f for reduced coordinates.
     VectorXd vector(const VectorXd& full) const;
-    /// Returns the diagonal of what add_weights adds.
+    /// Returns the diagonal of the matrix that add_weights adds.
     VectorXd weights(const VectorXd& full) const;
     /// Projects a vector of all dofs onto the motions of the free dofs.
     VectorXd project(const VectorXd& full) const;
     /// Returns the acceleration of all dofs under forces [N] alone, for masses [kg] of all dofs, which are the same along the three
     /// axes of a node: J (J^T M J)^-1 J^T f with the motions J of the free dofs. Zero where prescribed or without mass.
     VectorXd acceleration(const VectorXd& mass, const VectorXd& force) const;
-    /// Adds what the rotation of reduced nodes adds to the forces of B^T g: f with B^T f = sum_i g_i d2x_i/dz2 z for a motion
-    /// of all nodes with free coordinates z.
+    /// Adds forces f with B^T f = sum_i g_i d2x_i/dz2 z for a motion of all nodes with free coordinates z: the change of B^T g because B
+    /// changes.
     void add_curvature_forces(const VectorXd& gradient, const VectorXd& motion, VectorXd& forces) const;
     /// Moves a state by p, a vector of all dofs; reduced nodes move along their coordinates.
     void retract(VectorXd& q, const VectorXd& p) const;
@@ -145,7 +147,7 @@ class DofMap {
   private:
     /// Returns the sum over the prescribed directions d of a node of d (d . vector_of(move)).
     template <class VectorOf>
-    static Vec3 held_part(const PrescribedNode& h, const VectorOf& vector_of) {
+    static Vec3 prescribed_part(const PrescribedNode& h, const VectorOf& vector_of) {
         Vec3 part = Vec3::Zero();
         for (int axis = 0; axis < h.n_prescribed; ++axis)
             part += h.frame.col(axis) * h.frame.col(axis).dot(vector_of(h.moves[axis]));
@@ -162,7 +164,7 @@ class DofMap {
     VectorXd gathered(const VectorXd& full) const;
     static VectorXd rest_state(const Nodes& nodes);
 
-    std::vector<PrescribedNode> held_;
+    std::vector<PrescribedNode> prescribed_;
     const Nodes& nodes_;
     struct MoveSlices {
         ParameterSlice center, rotation, displacement;
@@ -171,12 +173,12 @@ class DofMap {
     std::vector<SupportMove> moves_;
     ParameterSlice support_factor_;
     Index full_size_;
-    std::vector<Index>
-        frame_of_;  // per node: its index in held_ if it is rotated, else -1; empty if no node is
-    std::vector<Index> held_at_;        // per node: its index in held_, else -1
-    std::vector<Index> free_unknowns_;  // reduced -> full, ascending
-    std::shared_ptr<const SparsePattern> pattern_, alone_,
-        coupled_;  // current; the last ones without and with a layer
+    // Per node: its index in prescribed_ if it is rotated, else -1; empty if no node is.
+    std::vector<Index> frame_of_;
+    std::vector<Index> prescribed_at_;  // per node: its index in prescribed_, else -1
+    std::vector<Index> free_dofs_;      // reduced -> full, ascending
+    // The current pattern, and the last ones without and with a layer.
+    std::shared_ptr<const SparsePattern> pattern_, without_layer_, with_layer_;
     // The free entries of the full matrix, as contiguous pieces: supports remove few entries.
     struct Pieces {
         struct Piece {

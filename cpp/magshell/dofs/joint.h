@@ -1,8 +1,8 @@
 // Joints between a link of a skeleton and its parent. A kind of joint is one class of joint_kinds.cpp, with one row in its table; all other
 // code asks JointKind and compares no kinds.
 //
-// A kind defines the pose of the child relative to the parent as a function of its coordinates. Each coordinate moves the child, and all links
-// beyond it, along a screw: it rotates them about an axis, with a translation along this axis, or it only translates them.
+// A kind defines the pose of the child relative to the parent as a function of its coordinates. Each coordinate moves the child, and all
+// links beyond it, along a screw: it rotates them about an axis, with a translation along this axis, or it only translates them.
 #pragma once
 
 #include <string_view>
@@ -24,14 +24,15 @@ struct JointSide {
 
 /// The motion by one coordinate, a column of B (skeleton_coordinates.h).
 struct JointColumn {
-    bool turns;          // whether it is a rotation
+    bool is_rotation;    // about w through o, else a translation along w
     Vec3 axis;           // w, a unit vector
     Vec3 origin;         // o, a point on the axis of a rotation [m]
     double scale;        // angle or displacement per unit of the coordinate: 1/l [rad/m] or 1
     double pitch = 0.0;  // translation along the axis of a rotation, per angle [m/rad]
 };
 
-/// The coordinate of a joint in terms of vectors y_p fixed to the parent and y_c fixed to the child, all given in the reference configuration.
+/// The coordinate of a joint in terms of vectors y_p fixed to the parent and y_c fixed to the child, all given in the reference
+/// configuration.
 ///
 ///   sum y_p . y_c + a . (o_c - o_p)                  the coordinate itself, o_p and o_c the origin as a point of the parent and the child
 ///   arg(sum y_p . y_c + i sum of the sines)          an angle, if there are sines
@@ -52,11 +53,11 @@ struct JointStrain {
     double share = 1.0;
 };
 
-/// The sums of SkeletonCoordinates::Beyond over the child and all links beyond it, about the origin of the joint as a point of the parent.
+/// The sums of SkeletonCoordinates::SubtreeSums for the child, about the origin of the joint as a point of the parent.
 struct JointSums {
-    Mat3 to_parent;                // from world axes to those of the parent
-    Vec3 parent_rate, child_rate;  // angular velocities of the parent and the child
-    Vec3 slide, force, twist, moment;
+    Mat3 to_parent;                                   // from world axes to those of the parent
+    Vec3 parent_rate, child_rate;                     // angular velocities of the parent and the child
+    Vec3 by_translation, force, by_rotation, moment;  // as in SubtreeSums
 };
 
 class JointKind {
@@ -69,7 +70,7 @@ class JointKind {
         Index freedom;             // number of coordinates
         bool has_origin = true;    // otherwise it is the center of the child
         bool has_axis = false;     // whether its motion has an axis
-        bool turns = false;        // whether it rotates the child
+        bool rotates = false;      // whether one of its coordinates rotates the child
         bool has_lengths = false;  // whether its coordinates are lengths, not angles
         bool has_world_columns =
             false;          // whether its rotations are about the world axes, also if earlier links rotate
@@ -87,8 +88,8 @@ class JointKind {
     /// Appends the motion by each coordinate. radians: 1/l of the child.
     virtual void add_columns(const Joint& joint, const JointSide& parent, const JointSide& child,
                              double radians, std::vector<JointColumn>& out) const = 0;
-    /// Returns the side of the child after the coordinates change by z [m], the angles by z/length. parent, child: the sides before; to: that of
-    /// the parent afterwards.
+    /// Returns the side of the child after the coordinates change by z [m], the angles by z/length. parent, child: the sides before; to:
+    /// that of the parent afterwards.
     virtual JointSide moved(const Joint& joint, const JointSide& parent, const JointSide& child,
                             const JointSide& to, const double* z, double length) const = 0;
 
@@ -96,7 +97,7 @@ class JointKind {
 
     /// Returns the coordinate, an angle [rad] from -pi to pi or a length [m].
     virtual double coordinate(const Joint& joint, const JointSide& parent, const JointSide& child) const;
-    /// Returns the gradient by the axis, which may have a part along it. s: the coordinate; rate: its rate.
+    /// Returns the gradient with respect to the axis, which may have a part along it. s: the coordinate; rate: its rate.
     virtual Vec3 axis_gradient(const Joint& joint, double s, double rate, const JointSums& sums) const;
     /// Returns the gradient by one of its own numbers.
     virtual double number_gradient(const Joint& joint, std::size_t number, double s, double rate,
@@ -111,7 +112,8 @@ class JointKind {
     /// Returns how far the coordinates are from the target of the motor [m], angles times length; a rotation takes the shorter way.
     virtual Vec3 motor_increment(const Joint& joint, const JointSide& parent, const JointSide& child,
                                  const Vec3& target, double length) const;
-    /// Returns the gradient by the target, given that by the coordinates in their own units. frame: rotation of the parent.
+    /// Returns the gradient with respect to the target, given that with respect to the coordinates in their own units. frame: rotation of
+    /// the parent.
     virtual Vec3 target_gradient(const Mat3& frame, const Vec3& target, const Vec3& by_coordinates) const;
 
   protected:
@@ -132,10 +134,10 @@ struct Joint {
     Vec3 origin = Vec3::Zero(), axis = Vec3::Zero();
     std::vector<double> numbers = {};  // JointKind::Traits::numbers
     bool has_motor = false;            // a motor prescribes its coordinate or rotation
-    bool damped = false;               // a damper acts in it
-    bool twisted = false;              // a ball joint with an applied moment
-    bool served = false;               // a ball joint with a servo
-    bool coned = false;                // a ball joint whose axis is limited to a cone
+    bool has_damper = false;           // a damper acts in it
+    bool has_torque = false;           // a ball joint with an applied moment
+    bool has_servo = false;            // a ball joint with a servo
+    bool has_cone = false;             // a ball joint whose axis is limited to a cone
 
     const JointKind::Traits& traits() const { return kind->traits(); }
     bool has_axis() const { return traits().has_axis; }

@@ -40,7 +40,7 @@ void add_rotations_about_world_axes(const Vec3& origin, double radians, std::vec
 // Six degrees of freedom: translations, then rotations about the center of the child.
 class FreeJoint final : public JointKind {
   public:
-    FreeJoint() : JointKind({.name = "free", .freedom = 6, .has_origin = false, .turns = true}) {}
+    FreeJoint() : JointKind({.name = "free", .freedom = 6, .has_origin = false, .rotates = true}) {}
 
     void add_columns(const Joint&, const JointSide&, const JointSide& child, double radians,
                      std::vector<JointColumn>& out) const override {
@@ -77,7 +77,7 @@ class RevoluteJoint : public JointKind {
         : RevoluteJoint({.name = "revolute",
                          .freedom = 1,
                          .has_axis = true,
-                         .turns = true,
+                         .rotates = true,
                          .motor = {"motor_angle", "SI"},
                          .law = law_of_angles}) {}
 
@@ -95,7 +95,7 @@ class RevoluteJoint : public JointKind {
     }
     Vec3 axis_gradient(const Joint& joint, double s, double rate, const JointSums& sums) const override {
         const Vec3& axis = joint.axis;
-        const Vec3 by_turn = sums.to_parent * (sums.twist + sums.moment.cross(sums.parent_rate)),
+        const Vec3 by_turn = sums.to_parent * (sums.by_rotation + sums.moment.cross(sums.parent_rate)),
                    by_rate = rate * (sums.to_parent * sums.moment);
         return std::sin(s) * by_turn + (1.0 - std::cos(s)) * by_turn.cross(axis) + std::cos(s) * by_rate +
                std::sin(s) * by_rate.cross(axis);
@@ -122,7 +122,7 @@ class ScrewJoint final : public RevoluteJoint {
         : RevoluteJoint({.name = "screw",
                          .freedom = 1,
                          .has_axis = true,
-                         .turns = true,
+                         .rotates = true,
                          .motor = {"motor_angle", "SI"},
                          .law = law_of_angles,
                          .numbers = {{"pitch", "m/rad"}}}) {}
@@ -149,7 +149,7 @@ class ScrewJoint final : public RevoluteJoint {
         const double pitch = joint.numbers[0];
         const Vec3 off = pitch * s * (sums.to_parent.transpose() * joint.axis);
         JointSums of_child = sums;
-        of_child.twist -= off.cross(sums.slide) + sums.child_rate.cross(off).cross(sums.force);
+        of_child.by_rotation -= off.cross(sums.by_translation) + sums.child_rate.cross(off).cross(sums.force);
         of_child.moment -= off.cross(sums.force);
         return RevoluteJoint::axis_gradient(joint, s, rate, of_child) +
                pitch * by_displacement(s, rate, sums);
@@ -164,9 +164,10 @@ class ScrewJoint final : public RevoluteJoint {
     }
 
   private:
-    // Returns the gradient by a vector b of the parent, for a translation by s b.
+    // Returns the gradient with respect to a vector b of the parent, for a translation by s b.
     static Vec3 by_displacement(double s, double rate, const JointSums& sums) {
-        return sums.to_parent * (s * (sums.slide + sums.force.cross(sums.parent_rate)) + rate * sums.force);
+        return sums.to_parent *
+               (s * (sums.by_translation + sums.force.cross(sums.parent_rate)) + rate * sums.force);
     }
 };
 
@@ -196,7 +197,8 @@ class PrismaticJoint final : public JointKind {
         return joint.axis.dot(parent.rotation.transpose() * (child.origin - parent.origin));
     }
     Vec3 axis_gradient(const Joint&, double s, double rate, const JointSums& sums) const override {
-        return sums.to_parent * (s * (sums.slide + sums.force.cross(sums.parent_rate)) + rate * sums.force);
+        return sums.to_parent *
+               (s * (sums.by_translation + sums.force.cross(sums.parent_rate)) + rate * sums.force);
     }
     JointCoordinate form(const Joint& joint) const override { return {.along = joint.axis}; }
     Vec3 motor_increment(const Joint& joint, const JointSide& parent, const JointSide& child,
@@ -211,7 +213,7 @@ class BallJoint final : public JointKind {
     BallJoint()
         : JointKind({.name = "ball",
                      .freedom = 3,
-                     .turns = true,
+                     .rotates = true,
                      .has_world_columns = true,
                      .motor = {"motor_rotation", "rad"},
                      .law = {"spring_stiffness", nullptr, nullptr, nullptr, nullptr, nullptr, nullptr,

@@ -44,7 +44,7 @@ class LinearTies : public ReducedCoordinates {
 
     /// Sets the tied dofs of a motion from the others.
     void extend(VectorXd& motion) const;
-    /// Adds the gradient by the displacements' origins, the positions of all dofs at rest, from that by the dofs.
+    /// Adds the gradient with respect to the displacements' origins, the positions of all dofs at rest, from that with respect to the dofs.
     void add_rest_gradient(const VectorXd& by_dofs, VectorXd& out) const;
     /// Adds the forces on tied dofs to all dofs that they follow, or to the free ones alone.
     void gather(VectorXd& forces) const;
@@ -77,8 +77,8 @@ class LinearTies : public ReducedCoordinates {
     VectorXd rounding(const VectorXd&) const override { return {}; }
 
   private:
-    struct
-        Entry {  // in a matrix of all dofs, or of a tied dof in `weights`; and where it goes in the reduced matrix
+    // from: an entry in a matrix of all dofs, or a tied dof in `weights`; to: where it goes in the reduced matrix.
+    struct Entry {
         Index from, to;
         double weight;
     };

@@ -36,7 +36,7 @@ ReducedAssembly::ReducedAssembly(ReducedCoordinatesList maps, const SystemMatrix
 
 void ReducedAssembly::collect_couplings(const std::vector<const SystemMatrix*>& matrices,
                                         const std::vector<Index>& reduced, Index free) {
-    free_ = free;
+    n_free_ = free;
     if (ties_) return ties_->collect_couplings(matrices, reduced);
     for (System& system : systems_) system.later.clear();
     for (const SystemMatrix* matrix : matrices)
@@ -55,17 +55,17 @@ void ReducedAssembly::append_rows(Index free, std::vector<Index>& rows) const {
     if (found == coupled_.end()) return;
     for (const Index each : found->second)
         for (Index j = 0; j < systems_[each].map->coordinates(); ++j)
-            rows.push_back(free_ + systems_[each].first + j);
+            rows.push_back(n_free_ + systems_[each].first + j);
 }
 
 void ReducedAssembly::append_columns(SparsePattern& pattern) const {
     for (const System& system : systems_)
         for (Index j = 0; j < system.map->coordinates(); ++j) {
             for (Index i = j; i < system.map->coordinates(); ++i)
-                pattern.rows.push_back(free_ + system.first + i);
+                pattern.rows.push_back(n_free_ + system.first + i);
             for (const Index other : system.later)
                 for (Index i = 0; i < systems_[other].map->coordinates(); ++i)
-                    pattern.rows.push_back(free_ + systems_[other].first + i);
+                    pattern.rows.push_back(n_free_ + systems_[other].first + i);
             pattern.column_starts.push_back(static_cast<Index>(pattern.rows.size()));
         }
 }
@@ -83,8 +83,8 @@ MatrixXd normal_of(const LinkTwists& b) {
     return b.product(VectorXd::Ones(b.rows()));
 }
 
-// Returns all coordinates, including those of motors, of a motion of the nodes.
-VectorXd all_of(const LinkTwists& b, const VectorXd& rows) {
+// Returns the coordinates z, including those of motors, of the motion B z nearest to a motion of the nodes (least squares).
+VectorXd coordinates_of(const LinkTwists& b, const VectorXd& rows) {
     return normal_of(b).ldlt().solve(b.pull_back(rows));
 }
 
@@ -99,12 +99,12 @@ void ReducedAssembly::find_entries(const std::vector<const SystemMatrix*>& matri
         system.entries.assign(matrices.size(), {});
         for (const Index other : system.later) system.across_rows[other] = {};
         for (Index j = 0; j < system.map->coordinates(); ++j) {
-            const Index column = free_ + system.first + j;
+            const Index column = n_free_ + system.first + j;
             system.own.push_back(position_in(pattern, column, column));
             for (const Index other : system.later)
                 if (systems_[other].map->coordinates() > 0)
                     system.across_rows[other].push_back(
-                        position_in(pattern, column, free_ + systems_[other].first));
+                        position_in(pattern, column, n_free_ + systems_[other].first));
         }
     }
     for (std::size_t which = 0; which < matrices.size(); ++which)
@@ -125,7 +125,7 @@ void ReducedAssembly::find_entries(std::size_t which, const SystemMatrix& matrix
     const auto add_mixed = [&](Index free, Index carried, Index k) {
         const Index map = system_of_[carried];
         if (systems_[map].map->coordinates() == 0) return;  // all of its coordinates are fixed or prescribed
-        const Index to = position_in(pattern, reduced[free], free_ + systems_[map].first);
+        const Index to = position_in(pattern, reduced[free], n_free_ + systems_[map].first);
         mixed.push_back({map, to, link(carried), k, row_of_[carried]});
     };
     for (Index column = 0; column < matrix.size(); ++column)
@@ -151,7 +151,7 @@ void ReducedAssembly::find_entries(std::size_t which, const SystemMatrix& matrix
 }
 
 void ReducedAssembly::linearize(const VectorXd& q) {
-    at_ = q;
+    state_ = q;
     for (System& system : systems_) {
         system.twists = system.map->twists(q);
         system.normal.reset();
@@ -198,16 +198,16 @@ void ReducedAssembly::add_weights(const VectorXd& weights, double* values) const
 void ReducedAssembly::add_curvature(const VectorXd& gradient, double* values) const {
     for (const System& system : systems_) {
         const Index n = system.map->coordinates();
-        add_lower(system, system.map->curvature(at_, gradient).topLeftCorner(n, n), values);
+        add_lower(system, system.map->curvature(state_, gradient).topLeftCorner(n, n), values);
     }
 }
 
 void ReducedAssembly::add_curvature_product(const VectorXd& gradient, const VectorXd& reduced,
                                             VectorXd& out) const {
     for (const System& system : systems_) {
-        const Index n = system.map->coordinates(), first = free_ + system.first;
+        const Index n = system.map->coordinates(), first = n_free_ + system.first;
         out.segment(first, n) +=
-            system.map->curvature(at_, gradient).topLeftCorner(n, n) * reduced.segment(first, n);
+            system.map->curvature(state_, gradient).topLeftCorner(n, n) * reduced.segment(first, n);
     }
 }
 
@@ -233,26 +233,26 @@ void ReducedAssembly::add_motor_increment(const VectorXd& q, VectorXd& increment
     }
 }
 
-const Eigen::LDLT<MatrixXd>& ReducedAssembly::normal(const System& system) {
+const Eigen::LDLT<MatrixXd>& ReducedAssembly::normal_matrix(const System& system) {
     const Index n = system.map->coordinates();
     if (!system.normal) system.normal.emplace(normal_of(system.twists).topLeftCorner(n, n));
     return *system.normal;
 }
 
-VectorXd ReducedAssembly::pull_back_free(const System& system, const VectorXd& rows) const {
+VectorXd ReducedAssembly::pull_back_free(const System& system, const VectorXd& rows) {
     return system.twists.pull_back(rows).head(system.map->coordinates());
 }
 
-VectorXd ReducedAssembly::motor_rows(const System& system, const VectorXd& rows) {
+VectorXd ReducedAssembly::pull_back_motors(const System& system, const VectorXd& rows) {
     return system.twists.pull_back(rows).tail(system.map->n_motor_coordinates());
 }
 
 VectorXd ReducedAssembly::free_part(const System& system, const VectorXd& full) const {
-    return normal(system).solve(pull_back_free(system, system.map->gather(full)));
+    return normal_matrix(system).solve(pull_back_free(system, system.map->gather(full)));
 }
 
 VectorXd ReducedAssembly::motor_part(const System& system, const VectorXd& full) const {
-    return all_of(system.twists, system.map->gather(full)).tail(system.map->n_motor_coordinates());
+    return coordinates_of(system.twists, system.map->gather(full)).tail(system.map->n_motor_coordinates());
 }
 
 void ReducedAssembly::add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move,
@@ -260,16 +260,16 @@ void ReducedAssembly::add_motor_increment_forces(const VectorXd& gradient, const
     for (const System& system : systems_) {
         const Index n = system.map->coordinates(), m = system.map->n_motor_coordinates();
         if (m == 0 || n == 0) continue;
-        add_forces_of(system,
-                      system.map->curvature(at_, gradient).topRightCorner(n, m) * motor_part(system, move),
-                      forces);
+        add_nodal_forces(
+            system, system.map->curvature(state_, gradient).topRightCorner(n, m) * motor_part(system, move),
+            forces);
     }
 }
 
-void ReducedAssembly::add_forces_of(const System& system, const VectorXd& by_coordinates,
-                                    VectorXd& forces) const {
+void ReducedAssembly::add_nodal_forces(const System& system, const VectorXd& by_coordinates,
+                                       VectorXd& forces) const {
     VectorXd own = system.map->gather(forces);
-    own += system.twists.motion(normal(system).solve(by_coordinates));
+    own += system.twists.motion(normal_matrix(system).solve(by_coordinates));
     system.map->scatter(own, forces);
 }
 
@@ -281,7 +281,7 @@ VectorXd ReducedAssembly::motor_rates(const System& system, const VectorXd& all,
 }
 
 VectorXd ReducedAssembly::motor_motion(const VectorXd& by_motor_forces) const {
-    VectorXd motion = VectorXd::Zero(at_.size());
+    VectorXd motion = VectorXd::Zero(state_.size());
     Index first = 0;
     for (const System& system : systems_)
         if (const VectorXd z = motor_rates(system, by_motor_forces, first); z.size() > 0)
@@ -296,7 +296,7 @@ void ReducedAssembly::add_motor_force_change(const VectorXd& gradient, const Vec
         const VectorXd z = motor_rates(system, by_motor_forces, first);
         const Index n = system.map->coordinates();
         if (z.size() > 0 && n > 0)
-            add_forces_of(system, system.map->motor_force_change(at_, gradient, z).head(n), forces);
+            add_nodal_forces(system, system.map->motor_force_change(state_, gradient, z).head(n), forces);
     }
 }
 
@@ -313,8 +313,8 @@ void ReducedAssembly::rest_vjp(const VectorXd& by_state, const VectorXd& lambda,
                                const VectorXd& by_motor_forces, VectorXd& by_nodes) const {
     Index first = 0;
     for (const System& system : systems_)
-        system.map->rest_vjp(at_, by_state, adjoint_rates(system, lambda, by_motor_forces, first), gradient,
-                             by_nodes);
+        system.map->rest_vjp(state_, by_state, adjoint_rates(system, lambda, by_motor_forces, first),
+                             gradient, by_nodes);
 }
 
 void ReducedAssembly::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
@@ -325,12 +325,13 @@ void ReducedAssembly::vjp(const VectorXd& by_state, const VectorXd& lambda, cons
         const Index n = map.coordinates(), m = map.n_motor_coordinates();
         if (m == 0 && !map.has_joint_parameters()) continue;
         const VectorXd z = adjoint_rates(system, lambda, by_motor_forces, first);
-        map.joint_parameters_vjp(at_, by_state, z, gradient, out);
+        map.joint_parameters_vjp(state_, by_state, z, gradient, out);
         if (m == 0) continue;
-        VectorXd by_motors = motor_rows(system, map.gather(by_state));
-        if (n > 0) by_motors += map.curvature(at_, gradient).bottomLeftCorner(m, n) * z.head(n);
-        if (by_motor_forces.size() > 0) by_motors += map.motor_force_change(at_, gradient, z.tail(m)).tail(m);
-        map.motor_vjp(at_, by_motors, out);
+        VectorXd by_motors = pull_back_motors(system, map.gather(by_state));
+        if (n > 0) by_motors += map.curvature(state_, gradient).bottomLeftCorner(m, n) * z.head(n);
+        if (by_motor_forces.size() > 0)
+            by_motors += map.motor_force_change(state_, gradient, z.tail(m)).tail(m);
+        map.motor_vjp(state_, by_motors, out);
     }
 }
 
@@ -341,7 +342,7 @@ VectorXd ReducedAssembly::motor_forces(const VectorXd& gradient) const {
         if (m == 0) continue;
         all.conservativeResize(all.size() + m);
         all.tail(m) =
-            system.map->motor_units().cwiseProduct(motor_rows(system, system.map->gather(gradient)));
+            system.map->motor_units().cwiseProduct(pull_back_motors(system, system.map->gather(gradient)));
     }
     return all;
 }
@@ -349,7 +350,7 @@ VectorXd ReducedAssembly::motor_forces(const VectorXd& gradient) const {
 void ReducedAssembly::pull_back(const VectorXd& full, VectorXd& reduced) const {
     if (ties_) ties_->gather(full, reduced);
     for (const System& system : systems_)
-        reduced.segment(free_ + system.first, system.map->coordinates()) =
+        reduced.segment(n_free_ + system.first, system.map->coordinates()) =
             pull_back_free(system, system.map->gather(full));
 }
 
@@ -358,7 +359,7 @@ void ReducedAssembly::diagonal(const VectorXd& weights, VectorXd& reduced) const
     for (const System& system : systems_) {
         const Index n = system.map->coordinates();
         if (n == 0) continue;  // an empty matrix has no diagonal to point to
-        reduced.segment(free_ + system.first, n) =
+        reduced.segment(n_free_ + system.first, n) =
             system.twists.product(system.map->gather(weights)).diagonal().head(n);
     }
 }
@@ -367,7 +368,7 @@ void ReducedAssembly::push_forward(const VectorXd& reduced, VectorXd& full) cons
     if (ties_) ties_->extend(full);
     for (const System& system : systems_)
         system.map->scatter(
-            system.twists.motion(reduced.segment(free_ + system.first, system.map->coordinates())), full);
+            system.twists.motion(reduced.segment(n_free_ + system.first, system.map->coordinates())), full);
 }
 
 void ReducedAssembly::project(VectorXd& full) const {
@@ -394,8 +395,8 @@ void ReducedAssembly::add_curvature_forces(const VectorXd& gradient, const Vecto
     for (const System& system : systems_) {
         const Index n = system.map->coordinates();
         if (n == 0) continue;
-        const MatrixXd curvature = system.map->curvature(at_, gradient).topLeftCorner(n, n);
-        add_forces_of(system, curvature * free_part(system, motion), forces);
+        const MatrixXd curvature = system.map->curvature(state_, gradient).topLeftCorner(n, n);
+        add_nodal_forces(system, curvature * free_part(system, motion), forces);
     }
 }
 
@@ -403,7 +404,7 @@ void ReducedAssembly::retract(VectorXd& q, const VectorXd& p) const {
     const VectorXd from = q;
     q += p;
     for (const System& system : systems_) {
-        const VectorXd z = all_of(system.map->twists(from), system.map->gather(p));
+        const VectorXd z = coordinates_of(system.map->twists(from), system.map->gather(p));
         system.map->scatter(system.map->gather(from), q);
         system.map->retract(q, z);
     }

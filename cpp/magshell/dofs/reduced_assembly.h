@@ -61,11 +61,11 @@ class ReducedAssembly {
     void add_motor_increment(const VectorXd& q, VectorXd& increment) const;
     /// Adds the forces due to the curved paths of motor-driven nodes, for a prescribed motion `move` under a gradient.
     void add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const;
-    /// Adds the gradients by the parameters of motors and joints, given the gradient by all nodes, by_state, and by the motor forces, at
-    /// an adjoint lambda of all dofs under a gradient g of the energy.
+    /// Adds the gradients with respect to the parameters of motors and joints, given the gradient with respect to all nodes, by_state, and
+    /// by the motor forces, at an adjoint lambda of all dofs under a gradient g of the energy.
     void vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
              const VectorXd& by_motor_forces, Gradient& out) const;
-    /// Adds the gradient by rest positions of vertices that are carried along, three numbers per node; arguments as in vjp.
+    /// Adds the gradient with respect to rest positions of vertices that are carried along, three numbers per node; arguments as in vjp.
     void rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
                   const VectorXd& by_motor_forces, VectorXd& by_nodes) const;
     /// Returns the forces [N] and moments [N m] of the motors for a gradient of the energy.
@@ -110,41 +110,47 @@ class ReducedAssembly {
         LinkCoupling mixed, inner;             // entries with free dofs, and within this system
         std::map<Index, LinkCoupling> across;  // by later system: entries with it
     };
-    struct System {
-        std::unique_ptr<ReducedCoordinates> map;
-        Index first = 0;    // index of its first coordinate among those of all systems
-        LinkTwists twists;  // B
+    struct System {                               // a rigid body or a skeleton
+        std::unique_ptr<ReducedCoordinates> map;  // from its coordinates to its nodes
+        Index first = 0;                          // index of its first coordinate among those of all systems
+        LinkTwists twists;                        // B
         // of B^T B of the free coordinates, computed on demand
         mutable std::optional<Eigen::LDLT<Eigen::MatrixXd>> normal;
         std::vector<Entries> entries;
-        std::set<Index> later;   // later systems that it is coupled with
-        std::vector<Index> own;  // where the rows of this system begin in each column of the pattern
-        std::map<Index, std::vector<Index>> across_rows;  // and those of a later system
+        std::set<Index> later;  // later systems that it is coupled with
+        // Where the rows of this system, and of each later one, begin in its columns of the pattern.
+        std::vector<Index> own;
+        std::map<Index, std::vector<Index>> across_rows;
     };
 
     void find_entries(std::size_t which, const SystemMatrix& matrix, const std::vector<Index>& reduced,
                       const SparsePattern& pattern);
-    /// Return the free coordinates of a motion of all nodes, those of the motors, and the factorization of B^T B.
+    /// Return the free coordinates and those of the motors of the motion B z nearest to a motion of all nodes; and the factorization of
+    /// B^T B for the free coordinates.
     VectorXd free_part(const System& system, const VectorXd& full) const;
     VectorXd motor_part(const System& system, const VectorXd& full) const;
-    static const Eigen::LDLT<Eigen::MatrixXd>& normal(const System& system);
-    static VectorXd motor_rows(const System& system, const VectorXd& rows);
+    static const Eigen::LDLT<Eigen::MatrixXd>& normal_matrix(const System& system);
+    /// Return the part of B^T rows for the motors, and for the free coordinates.
+    static VectorXd pull_back_motors(const System& system, const VectorXd& rows);
+    static VectorXd pull_back_free(const System& system, const VectorXd& rows);
     /// Adds forces f on the nodes with B^T f equal to these generalized forces on the free coordinates.
-    void add_forces_of(const System& system, const VectorXd& by_coordinates, VectorXd& forces) const;
-    /// Returns the coordinate rates [m] of the motors of a system, from numbers for all motors in their own units; moves `first` to the next system.
+    void add_nodal_forces(const System& system, const VectorXd& by_coordinates, VectorXd& forces) const;
+    /// Returns the coordinate rates [m] of the motors of a system, from numbers for all motors in their own units; moves `first` to the
+    /// next system.
     static VectorXd motor_rates(const System& system, const VectorXd& all, Index& first);
-    /// Returns the rates of all coordinates of a system in the motion lambda, those of motors from the gradient by their forces. `first` as
-    /// in motor_rates.
+    /// Returns the rates of all coordinates of a system in the motion lambda, those of motors from the gradient with respect to their
+    /// forces. `first` as in motor_rates.
     VectorXd adjoint_rates(const System& system, const VectorXd& lambda, const VectorXd& by_motor_forces,
                            Index& first) const;
-    VectorXd pull_back_free(const System& system, const VectorXd& rows) const;
+    /// Adds the lower half of a block of the matrix for the coordinates of one system.
     void add_lower(const System& system, const Eigen::MatrixXd& block, double* values) const;
 
     std::vector<System> systems_;
     std::unique_ptr<LinearTies> ties_;
-    Index coordinates_ = 0, free_ = 0;
+    Index coordinates_ = 0;  // of all systems, without those of motors
+    Index n_free_ = 0;       // number of free dofs before them
     bool has_motors_ = false, has_joint_parameters_ = false;
-    VectorXd at_;                               // the state q of the linearization
+    VectorXd state_;                            // the state q of the linearization
     std::vector<Index> system_of_, row_of_;     // by dof: its system, and its row of B
     std::map<Index, std::set<Index>> coupled_;  // by free dof: the systems that it is coupled with
 };

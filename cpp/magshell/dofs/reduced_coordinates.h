@@ -41,7 +41,7 @@ class ReducedCoordinates {
     virtual VectorXd motor_increment(const VectorXd& /*q*/) const { return {}; }
     /// Returns the motor coordinates per unit of their parameters [m per rad or m].
     virtual VectorXd motor_units() const { return {}; }
-    /// Adds the gradients by the motor parameters, given those by the motor coordinates.
+    /// Adds the gradients with respect to the motor parameters, given those with respect to the motor coordinates.
     virtual void motor_vjp(const VectorXd& /*q*/, const VectorXd& /*by_motors*/, Gradient& /*out*/) const {}
     /// Returns the derivative of sum g . B z along all coordinates, for rates z of the motors alone, at constant g.
     virtual VectorXd motor_force_change(const VectorXd& /*q*/, const VectorXd& /*gradient*/,
@@ -51,8 +51,8 @@ class ReducedCoordinates {
 
     /// Returns true if the origins and axes of its joints are parameters.
     virtual bool has_joint_parameters() const { return false; }
-    /// Adds the gradients by the joint parameters at q of a function with the gradient by_state by all nodes, plus those of
-    /// sum g . B z for rates z of all coordinates under a gradient g.
+    /// Adds gradients with respect to the joint parameters at q: of a function whose gradient with respect to all nodes is by_state, and of
+    /// sum g . B z for rates z of all coordinates and a gradient g.
     virtual void joint_parameters_vjp(const VectorXd& /*q*/, const VectorXd& /*by_state*/,
                                       const VectorXd& /*z*/, const VectorXd& /*gradient*/,
                                       Gradient& /*out*/) const {}
@@ -71,13 +71,14 @@ class ReducedCoordinates {
     /// rigidity and joints. Given the velocities v of the vertices, sets those of all of its nodes.
     virtual void project_state(VectorXd& q, VectorXd* v) const = 0;
 
-    /// Transforms gradients by the result of project_state, at q after it, to those by its arguments and by parameters; v and by_v may
-    /// be empty. by_rest: the gradient by rest positions, as in rest_vjp; nullptr if it is not asked for.
+    /// Transforms gradients with respect to the result of project_state, at q after it, to those with respect to its arguments and by
+    /// parameters; v and by_v may be empty. by_rest: the gradient with respect to rest positions, as in rest_vjp; nullptr if it is not
+    /// asked for.
     virtual void project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
                                    Gradient& out, VectorXd* by_rest) const = 0;
 
-    /// Returns the displacement of each node at q due to round-off of the coordinates that are computed from nodes [m], over the machine epsilon.
-    /// With long arms it exceeds the round-off of the nodes' own coordinates.
+    /// Returns the displacement of each node at q due to round-off of the coordinates that are computed from nodes [m], over the machine
+    /// epsilon. With long arms it exceeds the round-off of the nodes' own coordinates.
     virtual VectorXd rounding(const VectorXd& q) const = 0;
 
     /// Extract its rows from a vector of all dofs, and put them back.

@@ -132,15 +132,16 @@ LinkTwists SkeletonCoordinates::twists(const VectorXd& q) const {
             const JointColumn& column = *by_column[paths_->coordinate[at]];
             const Vec3 axis = column.scale * column.axis;
             const Vec3 velocity =
-                column.turns ? axis.cross(points[k] - column.origin) + column.pitch * axis : axis;
+                column.is_rotation ? axis.cross(points[k] - column.origin) + column.pitch * axis : axis;
             twists.col(at).head<3>() = velocity;
-            twists.col(at).tail<3>() = column.turns ? axis : Vec3(Vec3::Zero());
+            twists.col(at).tail<3>() = column.is_rotation ? axis : Vec3(Vec3::Zero());
         }
     }
     return {paths_, std::move(points), std::move(arms), std::move(twists)};
 }
 
-// Let F = sum g and M = sum (x - o_b) g^T over all nodes that coordinate b moves. The entry (a, b), with a on the path from the root to b, is
+// Let F = sum g and M = sum (x - o_b) g^T over all nodes that coordinate b moves. The entry (a, b), with a on the path from the root to b,
+// is
 //
 //   a and b rotate:                  sum g . (w_a x (w_b x (x - o_b) + h_b w_b)) = w_a . M w_b - (w_a . w_b) tr M + h_b (w_a x w_b) . F
 //   a rotates, b translates:         (w_a x w_b) . F
@@ -171,7 +172,7 @@ MatrixXd SkeletonCoordinates::second_derivative(const VectorXd& q, const VectorX
         for (Index b = first_[k]; b < first_[k] + joint.freedom(); ++b) {
             const JointColumn& inner = columns[b];
             const auto turn_and = [&](const JointColumn& outer) {
-                if (!inner.turns) return outer.axis.cross(inner.axis).dot(forces[k]);
+                if (!inner.is_rotation) return outer.axis.cross(inner.axis).dot(forces[k]);
                 const double turned = outer.axis.dot(products[k] * inner.axis) -
                                       outer.axis.dot(inner.axis) * products[k].trace();
                 if (inner.pitch == 0.0) return turned;
@@ -180,7 +181,7 @@ MatrixXd SkeletonCoordinates::second_derivative(const VectorXd& q, const VectorX
             for (Index above = k; above >= 0; above = joints_[above].parent)
                 for (Index a = first_[above]; a < first_[above] + joints_[above].freedom(); ++a) {
                     const JointColumn& outer = columns[a];
-                    if (!outer.turns || (above == k && !inner.turns)) continue;
+                    if (!outer.is_rotation || (above == k && !inner.is_rotation)) continue;
                     const Index i = column_of_[a], j = column_of_[b];
                     out(i, j) = outer.scale * inner.scale * turn_and(outer);
                     if (above != k) out(j, i) = out(i, j);
@@ -233,7 +234,7 @@ void SkeletonCoordinates::retract(VectorXd& q, const VectorXd& z) const {
 // The pose of a link is computed from corners with distances of about l, whose coordinates have round-off errors of epsilon |x|, |x| the
 // distance from the origin. So its rotation has an error of about epsilon |x|/l, of which the mean of four corners leaves an eighth
 // (rotation_round_off); computing the rotation adds epsilon. If a joint rotates by such an error, all links beyond it are displaced by the
-// error times their distance from the joint. The errors of several joints add up like independent random numbers, so their squares are added.
+// error times their distance from the joint. The errors of several joints are taken as independent, so their squares are added.
 VectorXd SkeletonCoordinates::rounding(const VectorXd& q) const {
     const std::vector<Pose> poses = this->poses(q);
     const std::vector<JointColumn> columns = this->columns(poses);
@@ -244,26 +245,26 @@ VectorXd SkeletonCoordinates::rounding(const VectorXd& q) const {
         Vec3 place = Vec3::Zero();
     };
     std::vector<Sums> all(n_links());
-    VectorXd moved_pose(nodes().size());
+    VectorXd displacement(nodes().size());
     for (Index k = 0; k < n_links(); ++k) {
         const Joint& joint = joints_[k];
         Sums& sums = all[k];
         if (joint.parent >= 0) sums = all[joint.parent];
-        if (joint.traits().turns) {
+        if (joint.traits().rotates) {
             const double turn =
                 rotation_round_off * poses[k].center.cwiseAbs().maxCoeff() / links_[k].length() + 1.0;
-            const auto& [turns, axis, at, scale, pitch] = columns[first_[k]];
+            const JointColumn& column = columns[first_[k]];
             sums.one += turn * turn;
-            sums.place += turn * turn * at;
-            sums.square += turn * turn * (at.squaredNorm() + pitch * pitch);
+            sums.place += turn * turn * column.origin;
+            sums.square += turn * turn * (column.origin.squaredNorm() + column.pitch * column.pitch);
         }
         for (Index n = 0; n < links_[k].size(); ++n) {
             const Vec3 x = q.segment<3>(3 * links_[k].nodes()[n]);
-            moved_pose[row_[k] + n] =
+            displacement[row_[k] + n] =
                 std::sqrt(std::max(0.0, sums.square - 2.0 * x.dot(sums.place) + x.squaredNorm() * sums.one));
         }
     }
-    return moved_pose;
+    return displacement;
 }
 
 std::vector<SkeletonCoordinates::Pose> SkeletonCoordinates::first_fit(const VectorXd& q) const {
@@ -304,8 +305,8 @@ void SkeletonCoordinates::project_state(VectorXd& q, VectorXd* v) const {
     scatter(b * solver_of(leading(b)).solve(leading(gather(*v))), *v);
 }
 
-// With B_l and v_l the rows of the leading nodes, project_state() returns v = B z with z = B_l^+ v_l (pseudoinverse). B depends on the pose;
-// its derivative is d2x/dz2.
+// With B_l and v_l the rows of the leading nodes, project_state() returns v = B z with z = B_l^+ v_l (pseudoinverse). B depends on the
+// pose; its derivative is d2x/dz2.
 void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q,
                                             VectorXd& by_v, Gradient& out, VectorXd* by_rest) const {
     const MatrixXd b = jacobian(q), led = leading(b);
@@ -323,7 +324,8 @@ void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v
         scatter(by_rates - given, apart);
         by_pose += second_derivative(q, apart).transpose() * rates;
     }
-    if (leading_.size() < nodes().size()) {  // otherwise all nodes are given, and the gradient by them stays
+    if (leading_.size() <
+        nodes().size()) {  // otherwise all nodes are given, and the gradient with respect to them stays
         VectorXd given = nothing;
         scatter_leading(led * inverse.solve(by_pose), given);
         scatter(gather(by_q) - given, by_state);
@@ -333,7 +335,7 @@ void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v
     if (by_rest) rest_vjp(q, by_state, rates, apart, *by_rest);
 }
 
-// Motors of joints: the distance of their coordinates from the targets, and the gradients by the targets.
+// Motors of joints: the distance of their coordinates from the targets, and the gradients with respect to the targets.
 
 // A rotation takes the shorter way to its target, at most half a turn.
 VectorXd SkeletonCoordinates::motor_increment(const VectorXd& q) const {
@@ -396,9 +398,9 @@ std::vector<Vec3> SkeletonCoordinates::ball_moments(const VectorXd& q, const Vec
 }
 
 VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const VectorXd& gradient,
-                                                 const VectorXd& n_motor_coordinates) const {
+                                                 const VectorXd& motor_rates) const {
     VectorXd z = VectorXd::Zero(coordinates_);
-    z.tail(n_motor_coordinates_) = n_motor_coordinates;
+    z.tail(n_motor_coordinates_) = motor_rates;
     VectorXd change = second_derivative(q, gradient).transpose() * z;
     const std::vector<JointColumn> columns = this->columns(poses(q));
     const std::vector<Vec3> moments = ball_moments(q, gradient, z, columns);
@@ -406,16 +408,16 @@ VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const Vector
         if (!joints_[motor.link].traits().has_world_columns) continue;
         for (Index above = joints_[motor.link].parent; above >= 0; above = joints_[above].parent)
             for (Index a = first_[above]; a < first_[above] + joints_[above].freedom(); ++a)
-                if (columns[a].turns)
+                if (columns[a].is_rotation)
                     change[column_of_[a]] -= columns[a].scale * columns[a].axis.dot(moments[motor.link]);
     }
     return change;
 }
 
-// Gradients by the origins, axes and numbers of joints. A change of an origin or axis leaves the reference positions of the links as they are;
-// at given joint coordinates it displaces all links beyond the joint. The formulas for axes and numbers are those of the kinds
-// (joint_kinds.cpp). With the rotations R of the parent link p and the child link k, their angular velocities w in the motion B z, the joint's
-// coordinate s and its rate s', and the current position o of the joint:
+// Gradients with respect to the origins, axes and numbers of joints. A change of an origin or axis leaves the reference positions of the
+// links as they are; at given joint coordinates it displaces all links beyond the joint. The formulas for axes and numbers are those of the
+// kinds (joint_kinds.cpp). With the rotations R of the parent link p and the child link k, their angular velocities w in the motion B z, the
+// joint's coordinate s and its rate s', and the current position o of the joint:
 //
 //   origin, rotation            dx/do = R_p - R_k,      d(B z)/do = [w_p]x R_p - [w_k]x R_k;         for a translation they cancel
 //   axis, translation by s      dx = s R_p da,          d(B z) = s w_p x R_p da + s' R_p da
@@ -423,20 +425,20 @@ VectorXd SkeletonCoordinates::motor_force_change(const VectorXd& q, const Vector
 //                               u = R_p (sin s da + (1 - cos s) a x da),   u' = w_p x u + s' R_p (cos s da + sin s a x da)
 //
 // Axes are unit vectors, so da is perpendicular to a. The columns of ball joints beyond the joint are rotations about the world axes and do
-// not rotate with u; this subtracts the moment of ball_moments(). Springs and dampers in the joint contribute nothing: they depend on s and s',
-// which are fixed here.
+// not rotate with u; this subtracts the moment of ball_moments(). Springs and dampers in the joint contribute nothing: they depend on s and
+// s', which are fixed here.
 
 bool SkeletonCoordinates::has_joint_parameters() const {
     return std::ranges::any_of(slices_,
                                [](const ParameterSlices& slices) { return slices.origin.size() > 0; });
 }
 
-void SkeletonCoordinates::Beyond::add(const Beyond& later) {
-    slide += later.slide;
-    force += later.force;
-    twist += later.twist + (later.center - center).cross(later.slide) +
-             (later.velocity - velocity).cross(later.force);
-    moment += later.moment + (later.center - center).cross(later.force);
+void SkeletonCoordinates::SubtreeSums::add(const SubtreeSums& child) {
+    by_translation += child.by_translation;
+    force += child.force;
+    by_rotation += child.by_rotation + (child.center - center).cross(child.by_translation) +
+                   (child.velocity - velocity).cross(child.force);
+    moment += child.moment + (child.center - center).cross(child.force);
 }
 
 std::vector<Vec3> SkeletonCoordinates::turning_rates(const VectorXd& z,
@@ -445,23 +447,23 @@ std::vector<Vec3> SkeletonCoordinates::turning_rates(const VectorXd& z,
     for (Index k = 0; k < n_links(); ++k) {
         if (joints_[k].parent >= 0) rates[k] = rates[joints_[k].parent];
         for (Index j = first_[k]; j < first_[k] + joints_[k].freedom(); ++j)
-            if (columns[j].turns) rates[k] += columns[j].scale * z[column_of_[j]] * columns[j].axis;
+            if (columns[j].is_rotation) rates[k] += columns[j].scale * z[column_of_[j]] * columns[j].axis;
     }
     return rates;
 }
 
-std::vector<SkeletonCoordinates::Beyond> SkeletonCoordinates::beyond(
+std::vector<SkeletonCoordinates::SubtreeSums> SkeletonCoordinates::subtree_sums(
     const VectorXd& q, const VectorXd& by_state, const VectorXd& z, const VectorXd& gradient,
     const std::vector<Pose>& poses, const std::vector<JointColumn>& columns) const {
     const VectorXd motion = twists(q).motion(z);
     const std::vector<Vec3> moments = ball_moments(q, gradient, z, columns),
                             rates = turning_rates(z, columns);
-    std::vector<Beyond> all(n_links());
+    std::vector<SubtreeSums> all(n_links());
     for (Index k = 0; k < n_links(); ++k) {
-        Beyond& own = all[k];
+        SubtreeSums& own = all[k];
         own.center = poses[k].center;
         own.velocity = Vec3::Zero();
-        own.twist = -moments[k];
+        own.by_rotation = -moments[k];
         for (Index n = row_[k]; n < row_[k] + RigidNodes::corners; ++n)
             own.velocity += motion.segment<3>(3 * n) / RigidNodes::corners;
         own.rate = rates[k];
@@ -469,9 +471,9 @@ std::vector<SkeletonCoordinates::Beyond> SkeletonCoordinates::beyond(
             const Index node = links_[k].nodes()[n];
             const Vec3 arm = q.segment<3>(3 * node) - own.center, s = by_state.segment<3>(3 * node),
                        g = gradient.segment<3>(3 * node);
-            own.slide += s;
+            own.by_translation += s;
             own.force += g;
-            own.twist += arm.cross(s) + (motion.segment<3>(3 * (row_[k] + n)) - own.velocity).cross(g);
+            own.by_rotation += arm.cross(s) + (motion.segment<3>(3 * (row_[k] + n)) - own.velocity).cross(g);
             own.moment += arm.cross(g);
         }
     }
@@ -480,31 +482,27 @@ std::vector<SkeletonCoordinates::Beyond> SkeletonCoordinates::beyond(
     return all;
 }
 
-void SkeletonCoordinates::add_own_gradients(Index link, const Beyond& of, const Vec3& parent_rate,
-                                            const VectorXd& z, const std::vector<Pose>& poses,
-                                            const std::vector<JointColumn>& columns, Gradient& out) const {
+void SkeletonCoordinates::add_joint_gradients(Index link, const SubtreeSums& sums, const Vec3& parent_rate,
+                                              const VectorXd& z, const std::vector<Pose>& poses,
+                                              const std::vector<JointColumn>& columns, Gradient& out) const {
     const Joint& joint = joints_[link];
     const ParameterSlices& slices = slices_[link];
     if (slices.axis.size() == 0 && slices.numbers.empty()) return;
     const JointSide parent = parent_side(link, poses);
-    Beyond about;
+    SubtreeSums about;
     about.center = parent.origin;
-    about.velocity = of.velocity + of.rate.cross(about.center - of.center);
-    about.add(of);
-    const JointSums sums{parent.rotation.transpose(),
-                         parent_rate,
-                         of.rate,
-                         about.slide,
-                         about.force,
-                         about.twist,
-                         about.moment};
+    about.velocity = sums.velocity + sums.rate.cross(about.center - sums.center);
+    about.add(sums);
+    const JointSums about_origin{
+        parent.rotation.transpose(), parent_rate, sums.rate, about.by_translation, about.force,
+        about.by_rotation,           about.moment};
     const double s = joint.kind->coordinate(joint, parent, child_side(link, poses)),
                  rate = columns[first_[link]].scale * z[column_of_[first_[link]]];
     for (std::size_t n = 0; n < slices.numbers.size(); ++n)
-        out.values[slices.numbers[n].first] += joint.kind->number_gradient(joint, n, s, rate, sums);
+        out.values[slices.numbers[n].first] += joint.kind->number_gradient(joint, n, s, rate, about_origin);
     if (slices.axis.size() == 0) return;
     const Vec3& axis = joint.axis;
-    const Vec3 by_axis = joint.kind->axis_gradient(joint, s, rate, sums);
+    const Vec3 by_axis = joint.kind->axis_gradient(joint, s, rate, about_origin);
     out.values.segment<3>(slices.axis.first) += by_axis - axis.dot(by_axis) * axis;
 }
 
@@ -513,17 +511,17 @@ void SkeletonCoordinates::joint_parameters_vjp(const VectorXd& q, const VectorXd
     if (!has_joint_parameters()) return;
     const std::vector<Pose> poses = this->poses(q);
     const std::vector<JointColumn> columns = this->columns(poses);
-    const std::vector<Beyond> sums = beyond(q, by_state, z, gradient, poses, columns);
+    const std::vector<SubtreeSums> sums = subtree_sums(q, by_state, z, gradient, poses, columns);
     for (Index k = 0; k < n_links(); ++k) {
         const Joint& joint = joints_[k];
         const Vec3 parent_rate = joint.parent < 0 ? Vec3::Zero().eval() : sums[joint.parent].rate;
         const auto by_point = [&](const Mat3& turn, const Vec3& rate) -> Vec3 {
-            return turn.transpose() * (sums[k].slide + sums[k].force.cross(rate));
+            return turn.transpose() * (sums[k].by_translation + sums[k].force.cross(rate));
         };
-        if (slices_[k].origin.size() > 0 && joint.traits().turns)
+        if (slices_[k].origin.size() > 0 && joint.traits().rotates)
             out.values.segment<3>(slices_[k].origin.first) +=
                 by_point(frame(k, poses), parent_rate) - by_point(poses[k].rotation, sums[k].rate);
-        add_own_gradients(k, sums[k], parent_rate, z, poses, columns, out);
+        add_joint_gradients(k, sums[k], parent_rate, z, poses, columns, out);
     }
 }
 

@@ -42,7 +42,7 @@ class SkeletonCoordinates final : public ReducedCoordinates {
     VectorXd motor_units() const override;
     void motor_vjp(const VectorXd& q, const VectorXd& by_motors, Gradient& out) const override;
     VectorXd motor_force_change(const VectorXd& q, const VectorXd& gradient,
-                                const VectorXd& n_motor_coordinates) const override;
+                                const VectorXd& motor_rates) const override;
     bool has_joint_parameters() const override;
     void joint_parameters_vjp(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
                               const VectorXd& gradient, Gradient& out) const override;
@@ -75,29 +75,31 @@ class SkeletonCoordinates final : public ReducedCoordinates {
     /// parent.
     Pose moved_pose(Index link, const std::vector<Pose>& from, const std::vector<Pose>& to,
                     const double* z) const;
-    /// Sums over the nodes of a link and of all links beyond it, for joint_parameters_vjp. c is the center of the link, and v its velocity in
-    /// the motion B z.
-    struct Beyond {
-        Vec3 slide = Vec3::Zero(), force = Vec3::Zero();  // sum by_state; sum gradient
-        // sum (x - c) x by_state + (B z - v) x gradient, minus the moments of ball joints (ball_moments)
-        Vec3 twist = Vec3::Zero();
+    /// Sums over the nodes x of a link and of all its descendants in the tree, for joint_parameters_vjp. by_state and gradient are the
+    /// arguments of that function, three numbers per node; c is the center of the link, and v its velocity in the motion B z.
+    struct SubtreeSums {
+        Vec3 by_translation = Vec3::Zero();  // sum by_state
+        Vec3 force = Vec3::Zero();           // sum gradient
+        // sum (x - c) x by_state + (B z - v) x gradient, minus the moments of ball joints (ball_moments): by a rotation about c
+        Vec3 by_rotation = Vec3::Zero();
         Vec3 moment = Vec3::Zero();  // sum (x - c) x gradient
         Vec3 center, velocity;       // c and v
         Vec3 rate = Vec3::Zero();    // angular velocity of the link in the motion B z
 
-        /// Adds the sums of a later link, converted to c and v of this one.
-        void add(const Beyond& later);
+        /// Adds the sums of a child link, converted to c and v of this one.
+        void add(const SubtreeSums& child);
     };
     /// Returns the angular velocity of each link in the motion B z.
     std::vector<Vec3> turning_rates(const VectorXd& z, const std::vector<JointColumn>& columns) const;
-    /// Returns these sums for every link.
-    std::vector<Beyond> beyond(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
-                               const VectorXd& gradient, const std::vector<Pose>& poses,
-                               const std::vector<JointColumn>& columns) const;
-    /// Adds the gradients by the axis and the numbers of a link's joint. of: sums of the link; parent_rate: angular velocity of its parent.
-    void add_own_gradients(Index link, const Beyond& of, const Vec3& parent_rate, const VectorXd& z,
-                           const std::vector<Pose>& poses, const std::vector<JointColumn>& columns,
-                           Gradient& out) const;
+    /// Returns the sums of every link.
+    std::vector<SubtreeSums> subtree_sums(const VectorXd& q, const VectorXd& by_state, const VectorXd& z,
+                                          const VectorXd& gradient, const std::vector<Pose>& poses,
+                                          const std::vector<JointColumn>& columns) const;
+    /// Adds the gradients with respect to the axis and the numbers of a link's joint. sums: those of the link; parent_rate: angular velocity
+    /// of its parent.
+    void add_joint_gradients(Index link, const SubtreeSums& sums, const Vec3& parent_rate, const VectorXd& z,
+                             const std::vector<Pose>& poses, const std::vector<JointColumn>& columns,
+                             Gradient& out) const;
     /// Returns a moment for each link, zero unless its joint is a ball joint. The columns of a ball joint are rotations about the world axes,
     /// also if earlier links rotate; so the derivative of sum g . B z by a rotation of an earlier link is smaller by this moment than if
     /// the columns rotated with that link. The moment is zero where B^T g is zero, as at an equilibrium without a motor in the joint.

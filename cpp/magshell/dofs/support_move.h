@@ -14,7 +14,7 @@ struct SupportMove {
     Vec3 point(const Vec3& rest, double factor) const;
     Vec3 direction(const Vec3& rest, double factor) const;
 
-    /// Return their derivatives by the support factor.
+    /// Return their derivatives with respect to the support factor.
     Vec3 point_rate(const Vec3& rest, double factor) const;
     Vec3 direction_rate(const Vec3& rest, double factor) const;
 

@@ -7,7 +7,7 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-/// Shape functions of a triangle with corners (0, 0), (1, 0), (0, 1), and their derivatives by s and t.
+/// Shape functions of a triangle with corners (0, 0), (1, 0), (0, 1), and their derivatives with respect to s and t.
 template <int N>
 struct Shapes {
     double value[N];

@@ -9,7 +9,7 @@
 
 namespace magshell {
 
-/// The energies of n groups of k nodes, and derivatives by the positions of their nodes as far as they were asked for.
+/// The energies of n groups of k nodes, and derivatives with respect to the positions of their nodes as far as they were asked for.
 struct GroupSamples {
     VectorXd energies;   // (n) [J]
     VectorXd gradients;  // (n, 3k), one group after another [N]

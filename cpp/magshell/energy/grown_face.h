@@ -8,7 +8,7 @@
 //              reference angle alpha~_i,
 //              o_i = alpha~_i (l'_i / (l~_i sqrt(det G)) - 1) - l'_i / (4 A') t'_j . K t'_k
 //
-// In derivatives by G, sym(a (x) b) is the derivative of a . G b.
+// In derivatives with respect to G, sym(a (x) b) is the derivative of a . G b.
 #pragma once
 
 #include <array>
@@ -37,7 +37,7 @@ class GrownTriangle {
 
     Mat2 membrane_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const;
     Mat2 bending_by_growth(const ShellMaterial& m, const Vec3& r, const Vec3& d) const;
-    /// Returns the derivative by G of |t'_i|^2; relative_length_by_growth() that of l'_i, divided by l'_i.
+    /// Returns the derivative with respect to G of |t'_i|^2; relative_length_by_growth() that of l'_i, divided by l'_i.
     Mat2 squared_length_by_growth(int i) const { return 2.0 * symmetric_product(grown[i], edge[i]); }
     /// Returns the gradient of by . |t'|^2 by growth.
     Mat2 lengths_by_growth(const Vec3& by) const {
@@ -49,8 +49,8 @@ class GrownTriangle {
         return symmetric_product(grown[i], edge[i]) / grown[i].squaredNorm();
     }
 
-    /// Returns the same natural triangle with itself as reference shape: derivatives by its growth are those by a homogeneous deformation
-    /// of the natural shape. from_natural() converts one of these to that by a deformation of the reference shape, G S G^-1.
+    /// Returns the same natural triangle with itself as reference shape: derivatives with respect to its growth are those by a homogeneous
+    /// deformation of the natural shape. from_natural() converts one of these to that by a deformation of the reference shape, G S G^-1.
     GrownTriangle natural() const { return {grown, Mat2::Identity()}; }
     Mat2 from_natural(const Mat2& by) const { return growth * by * inverse; }
 

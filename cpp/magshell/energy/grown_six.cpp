@@ -27,7 +27,7 @@ std::array<double, 3> gauss_point(int i, int g) {
     return at;
 }
 
-Vec3 three(const Eigen::Vector2d& in_plane) {
+Vec3 with_zero_z(const Eigen::Vector2d& in_plane) {
     return {in_plane.x(), in_plane.y(), 0.0};
 }
 
@@ -57,7 +57,7 @@ GrownSix::GrownSix(const std::array<Vec3, 6>& rest, const Mat3& growth, const Ma
       curvature_(axes_.transpose() * curvature * axes_),
       determinant_(growth_.determinant()) {
     for (const six_nodes::Point& point : six_nodes::inside)
-        inside_.emplace_back(rest, axes_.col(0), point.at);
+        interior_points_.emplace_back(rest, axes_.col(0), point.at);
     for (int i = 0; i < 3; ++i)
         for (int g = 0; g < 2; ++g) at_gauss_.emplace_back(rest, axes_.col(0), gauss_point(i, g));
     for (int m = 0; m < 3; ++m) {
@@ -67,19 +67,19 @@ GrownSix::GrownSix(const std::array<Vec3, 6>& rest, const Mat3& growth, const Ma
     }
     const SixNodeFace before(rest);
     for (int r = 0; r < 9; ++r) {
-        lengthened_[r] = 1.0;
+        length_ratio_[r] = 1.0;
         if (r % 3 < 2) {
             const Eigen::Vector2d& t = at_gauss_[2 * (r / 3) + r % 3].along[r / 3];
-            lengthened_[r] = (growth_ * t).norm() / t.norm();
+            length_ratio_[r] = (growth_ * t).norm() / t.norm();
         }
-        scale_[r] = lengthened_[r] * before.scale[r];
+        scale_[r] = length_ratio_[r] * before.scale[r];
     }
 }
 
 SixNodeFace GrownSix::face() const {
     std::array<std::array<Vec3, 3>, 6> tangents;
     for (int p = 0; p < 6; ++p)
-        for (int i = 0; i < 3; ++i) tangents[p][i] = three(growth_ * inside_[p].along[i]);
+        for (int i = 0; i < 3; ++i) tangents[p][i] = with_zero_z(growth_ * interior_points_[p].along[i]);
     std::array<double, 9> scale;
     for (int r = 0; r < 9; ++r) scale[r] = scale_[r];
     return {tangents, scale};
@@ -97,18 +97,18 @@ Vec9 GrownSix::squared_lengths() const {
     return lengths;
 }
 
-Vec9 GrownSix::bent() const {
-    Vec9 bent = Vec9::Zero();
+Vec9 GrownSix::curvature_measures() const {
+    Vec9 measures = Vec9::Zero();
     for (int p = 0; p < 6; ++p) {
-        const std::array<Eigen::Vector2d, 3>& t = inside_[p].along;
+        const std::array<Eigen::Vector2d, 3>& t = interior_points_[p].along;
         const double jacobian = determinant_ * std::abs(t[0].x() * t[1].y() - t[0].y() * t[1].x());
         for (int r = 0; r < 9; ++r) {
             const Eigen::Vector2d tj = growth_ * t[(r / 3 + 1) % 3], tk = growth_ * t[(r / 3 + 2) % 3];
-            bent[r] -= scale_[r] * 0.5 * six_nodes::inside[p].weight * test_at(r, p) / jacobian *
-                       tj.dot(curvature_ * tk);
+            measures[r] -= scale_[r] * 0.5 * six_nodes::inside[p].weight * test_at(r, p) / jacobian *
+                           tj.dot(curvature_ * tk);
         }
     }
-    return bent;
+    return measures;
 }
 
 std::array<Vec3, 3> GrownSix::grown_tangents(const std::array<double, 3>& at) const {
@@ -123,7 +123,7 @@ Mat2 GrownSix::membrane_by_growth(const ShellMaterial& m, const Vec9& r, const V
     for (int p = 0; p < 6; ++p) {
         const Eigen::Matrix<double, 3, 9> rows = membrane_interpolation(six_nodes::inside[p].at);
         sum += six_nodes::inside[p].weight *
-               GrownTriangle(inside_[p].along, growth_).membrane_by_growth(m, rows * r, rows * d);
+               GrownTriangle(interior_points_[p].along, growth_).membrane_by_growth(m, rows * r, rows * d);
     }
     return sum;
 }
@@ -138,7 +138,7 @@ Mat2 GrownSix::bending_by_growth(const ShellMaterial& m, const Vec9& r, const Ve
     Mat2 sum = Mat2::Zero();
     for (int p = 0; p < 6; ++p) {
         std::array<Eigen::Vector2d, 3> t;
-        for (int i = 0; i < 3; ++i) t[i] = growth_ * inside_[p].along[i];
+        for (int i = 0; i < 3; ++i) t[i] = growth_ * interior_points_[p].along[i];
         const double jacobian = std::abs(t[0].x() * t[1].y() - t[0].y() * t[1].x());
         Mat2 moment_r = Mat2::Zero(), moment_d = Mat2::Zero();
         for (int a = 0; a < 9; ++a) {
@@ -157,10 +157,10 @@ Mat2 GrownSix::bending_by_growth(const ShellMaterial& m, const Vec9& r, const Ve
         sum += both + both.transpose() - 3.0 * moment_r.cwiseProduct(strain_d).sum() * inverse_;
     }
     // S d_ equals d.
-    return -sum - lengthened_by_growth(of_r.cwiseProduct(d) + of_d.cwiseProduct(r));
+    return -sum - length_ratio_by_growth(of_r.cwiseProduct(d) + of_d.cwiseProduct(r));
 }
 
-Mat2 GrownSix::lengthened_by_growth(const Vec9& by_logarithm) const {
+Mat2 GrownSix::length_ratio_by_growth(const Vec9& by_logarithm) const {
     Mat2 sum = Mat2::Zero();
     for (int i = 0; i < 3; ++i)
         for (int g = 0; g < 2; ++g) {
@@ -186,18 +186,19 @@ Mat2 GrownSix::lengths_by_growth(const Vec9& by) const {
     return sum;
 }
 
-Mat2 GrownSix::inside_by_growth(const Vec9& by, const Vec9& inside) const {
-    const Vec9 work = by.cwiseProduct(inside);
-    return lengthened_by_growth(work) - work.sum() * inverse_;
+Mat2 GrownSix::interior_by_growth(const Vec9& by, const Vec9& interior) const {
+    const Vec9 work = by.cwiseProduct(interior);
+    return length_ratio_by_growth(work) - work.sum() * inverse_;
 }
 
 GrownFace::ByNatural GrownSix::natural_by_growth(const Vec9& by, const Vec9& rest) const {
-    const Vec9 of_rest = by.cwiseProduct(rest).cwiseProduct(this->rest()), of_bent = by.cwiseProduct(bent());
-    GrownFace::ByNatural sum{
-        lengthened_by_growth(of_rest + of_bent) - (0.5 * of_rest.sum() + of_bent.sum()) * inverse_,
-        Mat2::Zero()};
+    const Vec9 of_rest = by.cwiseProduct(rest).cwiseProduct(reference_factors()),
+               of_curvature = by.cwiseProduct(curvature_measures());
+    GrownFace::ByNatural sum{length_ratio_by_growth(of_rest + of_curvature) -
+                                 (0.5 * of_rest.sum() + of_curvature.sum()) * inverse_,
+                             Mat2::Zero()};
     for (int p = 0; p < 6; ++p) {
-        const std::array<Eigen::Vector2d, 3>& t = inside_[p].along;
+        const std::array<Eigen::Vector2d, 3>& t = interior_points_[p].along;
         const double jacobian = determinant_ * std::abs(t[0].x() * t[1].y() - t[0].y() * t[1].x());
         for (int i = 0; i < 3; ++i) {
             double weight = 0.0;

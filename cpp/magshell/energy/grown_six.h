@@ -37,34 +37,37 @@ class GrownSix {
     SixNodeFace face() const;
     /// Returns the natural values of the membrane measures.
     Vec9 squared_lengths() const;
-    /// Natural bending measures: the factors of the reference measures f~, and the part due to natural
-    /// curvature.
-    Vec9 rest() const { return lengthened_ / std::sqrt(determinant_); }
-    Vec9 bent() const;
+    /// Return the two parts of the natural bending measures (see above): the factors of the reference measures f~, and the measures
+    /// that the natural curvature K causes.
+    Vec9 reference_factors() const { return length_ratio_ / std::sqrt(determinant_); }
+    Vec9 curvature_measures() const;
     /// Returns the grown vectors t_i at a point, in world axes.
     std::array<Vec3, 3> grown_tangents(const std::array<double, 3>& at) const;
 
-    /// Return the gradient by growth of the work r . C d of fixed strains r and d.
+    /// Return the gradient of the work r . C d with respect to growth, for fixed strains r and d.
     Mat2 membrane_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const;
     Mat2 bending_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const;
-    /// Return gradients by growth: of by . squared_lengths(); of by . f' for a fixed shape, where `inside` is
-    /// f'; and, with the gradient by curvature, of by . (f~ rest() + bent()).
+    /// Return gradients with respect to growth: of by . squared_lengths(); of by . f' for a fixed shape, where `interior` is f'; and, with
+    /// the gradient with respect to curvature, of by . (f~ reference_factors() + curvature_measures()).
     Mat2 lengths_by_growth(const Vec9& by) const;
-    Mat2 inside_by_growth(const Vec9& by, const Vec9& inside) const;
+    Mat2 interior_by_growth(const Vec9& by, const Vec9& interior) const;
     GrownFace::ByNatural natural_by_growth(const Vec9& by, const Vec9& rest) const;
 
     Mat3 in_world(const Mat2& tensor) const { return axes_ * tensor * axes_.transpose(); }
 
   private:
-    Mat2 lengthened_by_growth(const Vec9& by_logarithm) const;
+    /// Returns the gradient of by_logarithm . log(length_ratio_) with respect to growth.
+    Mat2 length_ratio_by_growth(const Vec9& by_logarithm) const;
 
     std::array<Vec3, 6> rest_;
     Eigen::Matrix<double, 3, 2> axes_;
     Mat2 growth_, inverse_, curvature_;
     double determinant_;
-    // six points; Gauss points 3 i + g, where only t_i is used; three edge middles
-    std::vector<TangentPoint> inside_, at_gauss_, at_middle_;
-    Vec9 lengthened_, scale_;  // scale_: s'
+    // The six integration points; Gauss points 2 i + g of the edges, where only t_i is used; the middles of the three edges.
+    std::vector<TangentPoint> interior_points_, at_gauss_, at_middle_;
+    Vec9
+        length_ratio_;  // s'_r / s_r, the ratio of edge lengths after and before growth; 1 where r is no point of an edge
+    Vec9 scale_;  // s'
 };
 
 }  // namespace magshell

@@ -101,7 +101,7 @@ struct Guccione {
             linear(unit, e, d);
             work[k] = scale * (Green::double_dot(d, rate) + exponent(unit) * total);
         }
-        // Derivative by the fibre direction: D:rate = 2 a e (m . L m) + 2 bt E:L + 2 b (E m) . (L m), dQ/dm = 4
+        // Derivative with respect to the fibre direction: D:rate = 2 a e (m . L m) + 2 bt E:L + 2 b (E m) . (L m), dQ/dm = 4
         // a e E m + 2 b E^2 m.
         const SimdDouble a = c[1] + c[2] - SimdDouble(2.0) * c[3], b = SimdDouble(2.0) * (c[3] - c[2]);
         const SimdMat3 strain = Green::matrix(e), l = Green::matrix(rate);

@@ -9,7 +9,8 @@
 //
 //   x_p = sum_a s_pa y_a,   y = (x_0, x_1, x_2, n),   s_p = (barycentric coordinates, height [m] over the middle surface)
 //
-// With G = dB/dx, C = d2(M . B)/dx2 for a fixed M, P = dM/dB and V = w_p A~ h the derivatives of a point's energy by x_p and by the n in M are
+// With G = dB/dx, C = d2(M . B)/dx2 for a fixed M, P = dM/dB and V = w_p A~ h the derivatives of a point's energy by x_p and by the n in M
+// are
 //
 //   by x_p: - V G^T M                 by n: V across (n . B) B
 //   by x_p, x_p: - V (G^T P G + C)    by n, x_p: V across (B n^T + (n . B) 1) G       by n, n: V across B B^T
@@ -37,12 +38,12 @@ struct InducedFace : FaceFrame {
         FieldAtPoint field;           // the curvature is that of M . B, M of magnetization()
     };
 
-    /// First derivatives by y.
+    /// First derivatives with respect to y.
     struct Gradient {
         SimdVec3 by[4];
     };
 
-    /// First derivative by n, and second ones by y.
+    /// First derivative with respect to n, and second ones with respect to y.
     struct Hessian {
         SimdVec3 by_normal;
         SimdMat3 nodes[6];        // by x_a, x_b, at lower_index(a, b)
@@ -93,7 +94,7 @@ struct InducedFace : FaceFrame {
         out.normal += at.share[3] * (raised + transpose(mixed));
     }
 
-    /// Computes the gradient by the nodes.
+    /// Computes the gradient with respect to the nodes.
     void by_nodes(const Gradient& by, SimdVec3 g[3]) const {
         const SimdVec3 p = tangential(by.by[3]);
         const SimdVec3 by1 = cross(a2, p), by2 = cross(p, a1);

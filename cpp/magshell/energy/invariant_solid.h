@@ -6,7 +6,7 @@
 //
 // U may be evaluated at the mean J of an element. Mixed Newton stores the stresses s and p: besides them P is
 // linear in F, so rotations within a trial step do not spoil anything else. A law w that grows without bound
-// towards J = 0 stores the invariants instead, evaluates its derivatives there, and takes the derivative by J as a
+// towards J = 0 stores the invariants instead, evaluates its derivatives there, and takes the derivative with respect to J as a
 // secant to the J of the trial step: rotations have made that J larger, its own stiffness is too small for the
 // stored stress, and the tangent would become indefinite.
 //
@@ -62,7 +62,7 @@ struct LameSolid {
     }
 };
 
-/// w, and its derivatives by I1 and J.
+/// w, and its derivatives with respect to I1 and J.
 struct InvariantDerivatives {
     SimdDouble w, by_i, by_j, by_ii, by_ij, by_jj;
 };

@@ -68,7 +68,7 @@ struct MagneticFace : FaceFrame {
         node_blocks(h11, h12, h22, h);
     }
 
-    /// Adds the part due to the variation of the field in space: d2(M . B(x_b)) with one or two derivatives by x_b.
+    /// Adds the part due to the variation of the field in space: d2(M . B(x_b)) with one or two derivatives with respect to x_b.
     template <class Element>
     void add_hessian_by_position(const Element& e, const FieldAtPoint& field, SimdMat3 h[6]) const {
         SimdMat3 mixed[3];

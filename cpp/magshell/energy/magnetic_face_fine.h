@@ -26,7 +26,7 @@ struct FieldOverFace {
 
 namespace magnetic_face_fine {
 
-/// Returns c = - A~ h G_3^T M, the gradient by the normal for a fixed M.
+/// Returns c = - A~ h G_3^T M, the gradient with respect to the normal for a fixed M.
 template <class Law>
 SimdVec3 by_normal(const Law& face, const typename Law::Element& e, const FieldOverFace& field) {
     return -e.volume * transposed_times(field.gradient[3], face.magnetization(e));

@@ -41,7 +41,8 @@ namespace magshell {
 
 class OwnField {
   public:
-    /// The faces of all sheets: their nodes, their corners at rest [m], and whether their tangential magnetization rotates without stretching.
+    /// The faces of all sheets: their nodes, their corners at rest [m], and whether their tangential magnetization rotates without
+    /// stretching.
     struct Faces {
         std::vector<std::array<Index, 3>> nodes;
         std::vector<std::array<Vec3, 3>> rest;
@@ -63,7 +64,7 @@ class OwnField {
     struct DipoleWeights {
         std::array<double, 4> position{}, moment{};
     };
-    /// The gradient by the values of each face and of each tetrahedron, and by the weights of each dipole.
+    /// The gradient with respect to the values of each face and of each tetrahedron, and to the weights of each dipole.
     struct FaceGradient {
         std::vector<Vec3> magnetization;  // [J m/A]
         std::vector<double> thickness;    // [J/m]
@@ -96,7 +97,8 @@ class OwnField {
     /// charges.
     Index n_points() const { return 4 * active_elements_ + (has_charges_ ? 6 * active_faces_ : 0); }
 
-    /// Returns the elements with a source and the faces at them: the same energy and gradient, without derivatives by the values of faces.
+    /// Returns the elements with a source and the faces at them: the same energy and gradient, without derivatives with respect to the
+    /// values of faces.
     OwnField of_sources() const;
 
     /// Finds the near pairs of sources at positions q of all nodes.
@@ -190,7 +192,7 @@ class OwnField {
 
     OwnField() = default;
 
-    /// Where sums are evaluated: at the sources, or at all elements and faces, for derivatives by values that are zero now.
+    /// Where sums are evaluated: at the sources, or at all elements and faces, for derivatives with respect to values that are zero now.
     enum class Targets { sources, all };
 
     Index target_elements(Targets at) const {

@@ -48,7 +48,7 @@ struct Blend {
 };
 inline constexpr Blend of_elements{1.5, 2.0}, of_sides{2.5, 3.5};
 
-// The weight of the near value and its derivatives by t: 1 up to `near`, 0 from `far` on, with continuous second
+// The weight of the near value and its derivatives with respect to t: 1 up to `near`, 0 from `far` on, with continuous second
 // derivatives.
 struct BlendWeight {
     double value, slope, curvature;
@@ -126,7 +126,7 @@ struct OwnField::Geometry {
         const Triple<T>& origin = x[face.nodes[0]];
         return {{x[face.nodes[1]] - origin, x[face.nodes[2]] - origin}, face.inverse};
     }
-    // Returns sum l~_e nu~_e dE/dQ_e over the edges of a face, in the basis of its plane: the gradient by h M~, or by
+    // Returns sum l~_e nu~_e dE/dQ_e over the edges of a face, in the basis of its plane: the gradient with respect to h M~, or by
     // h U^-1 M~ of a face that rotates, in which Q_e is linear. l~_e: length at rest, nu~_e: outward conormal at rest,
     // Q_e: charge of the edge.
     std::array<T, 2> by_charges(const Face& face, const std::vector<ElementAdjoint<T>>& edges) const {
@@ -143,7 +143,7 @@ struct OwnField::Geometry {
         sum += x[element.nodes[2]];
         return T(1.0 / 3.0) * sum;
     }
-    // Adds the derivative by middle(element) to those by its nodes.
+    // Adds the derivative with respect to middle(element) to those with respect to its nodes.
     void add_by_middle(const Element& element, const Triple<T>& by_middle, ElementAdjoint<T>& out) const {
         const T share = T(element.is_edge() ? 0.5 : 1.0 / 3.0);
         for (int k = 0; k < element.n_nodes(); ++k) out.nodes[k] += share * by_middle;
@@ -225,7 +225,7 @@ struct OwnField::Geometry {
         out.current += dot(by_element, along(element));
     }
 
-    // Adds the derivatives by the values of a face, given the sums at a point of one of its charged sides.
+    // Adds the derivatives with respect to the values of a face, given the sums at a point of one of its charged sides.
     void add(Index f, const SourceSums<T>& sums, const double* weights, double zeta, double weight,
              FaceAdjoint<T>& out) const {
         const Triple<T> pull = T(-own_field::strength) * sums.pull;

@@ -113,7 +113,7 @@ class PointArrays {
     std::array<std::vector<double>, 3> values_, rates_;
 };
 
-/// G and its derivatives by the nodes of both elements and by h n.
+/// G and its derivatives with respect to the nodes of both elements and to h n.
 template <class T>
 class PairMean {
   public:

@@ -8,8 +8,8 @@ using namespace own_field;
 
 namespace {
 
-// The solid angle of the triangle with corners r, seen from the origin, positive on the side of its normal [Van Oosterom, Strackee 1983], and its
-// derivatives by the corners.
+// The solid angle of the triangle with corners r, seen from the origin, positive on the side of its normal [Van Oosterom, Strackee 1983],
+// and its derivatives with respect to the corners.
 template <class T>
 T solid_angle(const Triple<T> r[3], Triple<T> by_corner[3]) {
     using std::atan2;

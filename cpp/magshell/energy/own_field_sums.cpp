@@ -97,7 +97,7 @@ void OwnField::add_self(const Geometry<T>& at, Index element, ElementAdjoint<T>&
     }
 }
 
-// Carries the derivatives by normals and currents on to the positions of the nodes.
+// Carries the derivatives with respect to normals and currents on to the positions of the nodes.
 template <class T>
 void OwnField::collect(const Geometry<T>& at, Evaluation<T>& out) const {
     out.by_position.assign(nodes_.size(), {});

@@ -1,4 +1,5 @@
-// A point of a quadratic triangle at rest: the flat triangle (0, a~_1, a~_2) of its tangents, and gradients by the nodes from those by it.
+// A point of a quadratic triangle at rest: the flat triangle (0, a~_1, a~_2) of its tangents, and gradients with respect to the nodes from
+// those with respect to it.
 #pragma once
 
 #include "magshell/energy/rest_corners.h"
@@ -14,11 +15,11 @@ class RestPointSix {
     /// Returns the corners of the triangle of its tangents: edge i of it is dx/dt_i.
     const std::array<Vec3, 3>& corners() const { return corners_; }
 
-    /// Adds to `out` the gradient by the nodes, for gradients by a~_1 and a~_2.
+    /// Adds to `out` the gradient with respect to the nodes, for gradients with respect to a~_1 and a~_2.
     void add_by_edges(const std::array<Vec3, 2>& by, const std::array<Index, 6>& nodes, VectorXd& out) const {
         for (int a = 0; a < 6; ++a) out.segment<3>(3 * nodes[a]) += first_[a] * by[0] - second_[a] * by[1];
     }
-    /// Adds that for a derivative by a homogeneous deformation of the triangle in its plane, as in rest_corners.h.
+    /// Adds that for a derivative with respect to a homogeneous deformation of the triangle in its plane, as in rest_corners.h.
     void add_by_deformation(const Mat3& by, const std::array<Index, 6>& nodes, VectorXd& out) const {
         const RestShape shape(corners_);
         add_by_edges({by * shape.gradients[1], by * shape.gradients[2]}, nodes, out);

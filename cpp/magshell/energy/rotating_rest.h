@@ -7,7 +7,7 @@
 //
 //   B = - V ((m . b) I - F^T [y] R),   Y y = m x b,   Y = (tr S) I - S
 //
-// The power is the rate of E along a motion of the nodes, which changes b too, and its derivative by H is the rate of B:
+// The power is the rate of E along a motion of the nodes, which changes b too, and its derivative with respect to H is the rate of B:
 //
 //   Y y' = m' x b + m x b' - Y' y,   Y' = (tr S') I - S',   S' = F' R^T - S [w],   m' = w x m,   R' = [w] R
 #pragma once
@@ -23,7 +23,7 @@ struct FluxAndRate {
     Vec3 flux, rate;
 };
 
-/// Returns the derivative by H. f, rate: the deformation gradient and its rate; rotation: R; volume [m3] at rest.
+/// Returns the derivative with respect to H. f, rate: the deformation gradient and its rate; rotation: R; volume [m3] at rest.
 inline Mat3 rotating_by_rest_deformation(const Mat3& f, const Mat3& rate, const Mat3& rotation,
                                          const Vec3& remanence, double volume, const FluxAndRate& applied) {
     const auto cross_matrix = [](const Vec3& v) {
@@ -54,8 +54,8 @@ struct MovingFace {
     Mat3 rotation;
 };
 
-/// Returns the gradient by the edge vectors at rest as magnetic_by_rest_edges does. Normals go over into normals, so a motion of a corner
-/// along n~ adds dn~ (x) n~ to H, dn~ = - sum_k g_k (n~ . dX_k).
+/// Returns the gradient with respect to the edge vectors at rest as magnetic_by_rest_edges does. Normals go over into normals, so a motion
+/// of a corner along n~ adds dn~ (x) n~ to H, dn~ = - sum_k g_k (n~ . dX_k).
 inline std::array<Vec3, 2> rotating_by_rest_edges(const RestShape& rest, const MovingFace& face,
                                                   const Vec3& remanence, double volume,
                                                   const FluxAndRate& applied) {

@@ -21,11 +21,11 @@ using Vec4 = Eigen::Vector4d;  // three components and a zero: one vector regist
 /// Returns the coefficients c_{-1} ... c_n that interpolate the samples f_0 ... f_{n-1}, n >= 2.
 std::vector<Vec4> spline_coefficients(std::span<const Vec4> samples);
 
-/// Applies the transpose of spline_coefficients: returns the gradient by the n samples, given that by the n + 2
+/// Applies the transpose of spline_coefficients: returns the gradient with respect to the n samples, given that with respect to the n + 2
 /// coefficients.
 std::vector<Vec4> spline_samples_gradient(std::span<const Vec4> by_coefficients);
 
-/// The weights of four neighbouring coefficients, for the value and for its first and second derivative by t.
+/// The weights of four neighbouring coefficients, for the value and for its first and second derivative with respect to t.
 using SplineWeights = std::array<std::array<double, 4>, 3>;
 
 constexpr SplineWeights spline_weights(double t) {

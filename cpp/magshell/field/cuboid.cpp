@@ -15,7 +15,7 @@ namespace {
 // between them. If it is left out there, the rest is regular on the lines that prolong edges. All higher
 // derivatives are those of the logarithms and of 1/r; F_xxx = -F_xyy - F_xzz, because F is harmonic.
 
-/// A function of the position relative to a line: its value, and its derivatives by the coordinates (b, c)
+/// A function of the position relative to a line: its value, and its derivatives with respect to the coordinates (b, c)
 /// perpendicular to it.
 struct LineFunction {
     double value, b, c, bb, bc, cc;

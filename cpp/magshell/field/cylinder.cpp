@@ -132,7 +132,7 @@ RingSums ring_sums(double radius, double rho, double z, double t, int order, boo
     return ring.sums();
 }
 
-/// Returns the derivatives of an infinite cylinder's potential, and those of its derivative by the radius.
+/// Returns the derivatives of an infinite cylinder's potential, and those of its derivative with respect to the radius.
 RingSums endless(double radius, double rho) {
     constexpr double pi = std::numbers::pi;
     RingSums result;

@@ -71,9 +71,9 @@ void Dipoles::add_samples(std::span<const Vec3> points, std::span<const Vec3> mo
     });
 }
 
-// Gradients by the parameters: B and dB/dx are linear in p and, as matrices that map p to u . B and m . dB/dx
-// v, symmetric. The derivative by p is therefore the flux of a dipole u plus the gradient of a dipole m along
-// v. The derivative by the position of the dipole is minus that by the point.
+// Gradients with respect to the parameters: B and dB/dx are linear in p and, as matrices that map p to u . B and m . dB/dx
+// v, symmetric. The derivative with respect to p is therefore the flux of a dipole u plus the gradient of a dipole m along
+// v. The derivative with respect to the position of the dipole is minus that with respect to the point.
 std::vector<FieldParameter> Dipoles::parameters() const {
     const Index n = static_cast<Index>(positions_.size());
     return {{"positions", "m", n, 3}, {"moments", "A m^2", n, 3}};

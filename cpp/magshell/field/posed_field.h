@@ -2,7 +2,7 @@
 //
 //   B(x) = R B_own(R^T (x - center))
 //
-// The gradient by the pose follows from samples of the field itself, whatever kind of field it is.
+// The gradient with respect to the pose follows from samples of the field itself, whatever kind of field it is.
 #pragma once
 
 #include "magshell/field/applied_field.h"

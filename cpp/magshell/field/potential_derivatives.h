@@ -9,7 +9,7 @@
 
 namespace magshell {
 
-/// Return the index of the derivative along these axes: derivatives by x come first, then y, then z.
+/// Return the index of the derivative along these axes: derivatives with respect to x come first, then y, then z.
 constexpr int derivative_index(int i, int j) {
     const int p = (i > 0) + (j > 0), c = (i == 2) + (j == 2);
     return p * (p + 1) / 2 + c;

@@ -172,7 +172,7 @@ void SampledField::add_samples(std::span<const Vec3> points, std::span<const Vec
     });
 }
 
-// Gradient by the samples. A point depends linearly on the coefficients around it. Points are processed one
+// Gradient with respect to the samples. A point depends linearly on the coefficients around it. Points are processed one
 // after another, because they share coefficients.
 void SampledField::add_vjp(std::span<const Vec3> points, const FieldProbe& probe, double scale,
                            std::span<double> out) const {

@@ -21,7 +21,7 @@ struct Placement {
     Vec3 center = Vec3::Zero(), rotation_vector = Vec3::Zero();
 };
 
-/// The gradient by the placement and by the pose relative to it.
+/// The gradient with respect to the placement and to the pose relative to it.
 struct ObstacleGradient {
     Placement placement;
     ObstaclePose pose;
@@ -45,8 +45,8 @@ class ObstacleState {
     Vec3 velocity(const Vec3& x) const { return pose_.velocity + pose_.spin.cross(x - center_); }
     const Vec3& spin() const { return pose_.spin; }
 
-    /// Adds the gradient by placement and pose of a function of the distance at x, its normal and the velocity
-    /// relative to the body, given its gradients by these three.
+    /// Adds the gradient with respect to placement and pose of a function of the distance at x, its normal and the velocity
+    /// relative to the body, given its gradients with respect to these three.
     void vjp(const Vec3& x, const Distance& at, double by_distance, const Vec3& by_normal,
              const Vec3& by_relative_velocity, ObstacleGradient& out) const;
 

@@ -31,14 +31,14 @@ class Tube final : public Obstacle {
     Distance distance(const Vec3& point) const override;
 
   private:
-    // The spline and its derivatives by s [knots]: center and radius.
+    // The spline and its derivatives with respect to s [knots]: center and radius.
     struct Section {
         Vec4 value, first, second;
     };
     Section section(double s) const;
     void check(double first_knot) const;
 
-    // psi and its derivatives by s. Where the point lies on the curve, psi has a kink and no direction.
+    // psi and its derivatives with respect to s. Where the point lies on the curve, psi has a kink and no direction.
     struct Slope {
         double value, first, second;
     };

@@ -60,18 +60,19 @@ class Bodies {
     std::vector<Clique> cliques() const;
 
     VectorXd rest_state() const;
-    /// Returns all dofs from positions (n_v, 3) and edge rotations (n_e,) in the numbering of the caller; the points of rigid bodies are at rest.
+    /// Returns all dofs from positions (n_v, 3) and edge rotations (n_e,) in the numbering of the caller; the points of rigid bodies are at
+    /// rest.
     VectorXd state(const Rows3& positions, const VectorXd& edge_rotations) const;
     /// Returns vectors at the caller's vertices as a vector of all dofs, zero elsewhere; of welded vertices the first one counts. The rows
     /// are the vertices of bodies, or also the points of rigid bodies.
     VectorXd vectors(const Rows3& of_vertices) const;
-    /// Returns the gradient by all dofs from that by the caller's positions and edge rotations: the transpose of positions(), or of
-    /// points().
+    /// Returns the gradient with respect to all dofs from that with respect to the caller's positions and edge rotations: the transpose of
+    /// positions(), or of points().
     VectorXd gradient_by_state(const Rows3& by_positions, const VectorXd& by_edge_rotations) const;
     /// Return the positions of the bodies' vertices; and of the points of rigid bodies, too.
     Rows3 positions(const VectorXd& q) const { return rows(q, n_body_vertices_); }
     Rows3 points(const VectorXd& q) const { return rows(q, nodes_.n_user_vertices()); }
-    /// Returns the gradient by the caller's positions from that by all dofs: the transpose of vectors().
+    /// Returns the gradient with respect to the caller's positions from that with respect to all dofs: the transpose of vectors().
     Rows3 gradient_by_vectors(const VectorXd& by_q) const;
     VectorXd edge_rotations(const VectorXd& q) const;
     /// Returns a number per vertex, including points of rigid bodies, as a number per dof, zero for all others. The numbers of welded

@@ -18,12 +18,13 @@ namespace magshell {
 namespace {
 
 // Converts the nodes of supports from the numbering of the caller: vertices of bodies first, then directions.
-std::vector<PrescribedNode> renumbered(std::vector<PrescribedNode> held, const Bodies& bodies) {
+std::vector<PrescribedNode> renumbered(std::vector<PrescribedNode> prescribed, const Bodies& bodies) {
     const Nodes& nodes = bodies.nodes();
-    for (PrescribedNode& h : held)
-        h.node = h.node < bodies.n_body_vertices() ? nodes.vertices.core[h.node]
-                                                   : nodes.direction_node(h.node - bodies.n_body_vertices());
-    return held;
+    for (PrescribedNode& each : prescribed)
+        each.node = each.node < bodies.n_body_vertices()
+                        ? nodes.vertices.core[each.node]
+                        : nodes.direction_node(each.node - bodies.n_body_vertices());
+    return prescribed;
 }
 
 std::vector<TiedDof> renumbered(std::vector<TiedDof> tied, const Nodes& nodes) {
@@ -111,8 +112,8 @@ VectorXd Model::contact_stiffness_diagonal() const {
     return of_nodes;
 }
 
-// Positions far from the origin have larger round-off. They are rounded up to powers of two, so that most states share the forces
-// computed once.
+// Positions far from the origin have larger round-off. The largest coordinate is rounded up to a power of two, so that most states share
+// the forces computed once.
 VectorXd Model::cancelling_forces(const VectorXd& q) {
     const double reach = q.head(n_coordinates()).lpNorm<Eigen::Infinity>();
     double beyond = 0.0;
@@ -310,12 +311,14 @@ void Model::reduce_matrix(Factor& factor) {
     static_cast<OperatorFactor&>(factor).set_operator(product_of(false), product_of(true));
 }
 
+// Finds the columns that each element block clears before it assembles: those of its own nodes that no earlier block has. The last entry has
+// the columns that no block touches.
 void Model::assign_columns() {
     const std::vector<ElementBlock> element_blocks = terms_.coloring.in_order();
     std::vector<bool> taken(matrix_.size(), false);
     first_columns_.resize(element_blocks.size() + 1);
     std::vector<Index> columns;
-    const auto set_time_varying = [&](Index first, Index count) {
+    const auto take = [&](Index first, Index count) {
         for (Index column = first; column < first + count; ++column) {
             if (!taken[column]) columns.push_back(column);
             taken[column] = true;
@@ -334,13 +337,13 @@ void Model::assign_columns() {
         const Body& body = *bodies_.all()[element_block.body];
         for (Index element = element_block.first; element < element_block.last; ++element) {
             for (const Index node : body.nodes_of(element))
-                if (node >= 0) set_time_varying(3 * node, 3);
+                if (node >= 0) take(3 * node, 3);
             for (const Index r : body.scalars_of(element))
-                if (r >= 0) set_time_varying(3 * matrix_.nodes() + r, 1);
+                if (r >= 0) take(3 * matrix_.nodes() + r, 1);
         }
         hand_over(first_columns_[element_block.number]);
     }
-    set_time_varying(0, 3 * matrix_.nodes());
+    take(0, 3 * matrix_.nodes());
     hand_over(first_columns_.back());
 }
 

@@ -26,7 +26,7 @@ class Model {
     Model& operator=(const Model&) = delete;
     ~Model();
 
-    /// The parameters: their layout, their values, and derivatives by them.
+    /// The parameters: their layout, their values, and derivatives with respect to them.
     ModelParameters& parameters() { return parameters_; }
     const ModelParameters& parameters() const { return parameters_; }
     /// Properties of the energy that solvers must know, and how far a step may go.
@@ -78,7 +78,8 @@ class Model {
     VectorXd term_gradient(std::string_view name, const VectorXd& q, const LoadParameters& load_parameters);
     /// Returns a sentence that names the term and vertex whose force is not finite at q; empty if all forces are finite.
     std::string not_finite(const VectorXd& q, const LoadParameters& load_parameters);
-    /// Assembles the Hessian at the last evaluated state. project_psd: contact between bodies and low-rank terms contribute positive semidefinite parts.
+    /// Assembles the Hessian at the last evaluated state. project_psd: contact between bodies and low-rank terms contribute positive
+    /// semidefinite parts.
     void assemble(const VectorXd& q, const LoadParameters& load_parameters, bool extrapolated_stress,
                   bool project_psd = false);
     /// Returns true if the Hessian assembled last is nonsymmetric on the free dofs: it is then matrix() plus nonsymmetric_tangent(), and
@@ -136,7 +137,8 @@ class Model {
     /// Returns how often a pattern was analysed.
     int analyses() const { return factors_.analyses(); }
 
-    /// The accumulated angles of all terms, which depend on the history by full turns (the branch of the angle). Empty: those of the rest state.
+    /// The accumulated angles of all terms, which depend on the history by full turns (the branch of the angle). Empty: those of the rest
+    /// state.
     using AngleBranches = std::vector<std::vector<double>>;
     AngleBranches angle_branches() const;
     void set_angle_branches(const AngleBranches& angle_branches);

@@ -1,4 +1,4 @@
-// ModelParameters: the parameters of a scene: their layout, their values, and derivatives by them.
+// ModelParameters: the parameters of a scene: their layout, their values, and derivatives with respect to them.
 #pragma once
 
 #include "magshell/dofs/dof_map.h"
@@ -41,8 +41,8 @@ class ModelParameters {
     /// Adds the gradient of a function of the strain rates of joint dampers at q for velocities v.
     void damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
                           VectorXd& by_v, Gradient& out) const;
-    /// Returns the derivative of the gradient at q along the load path: load parameters `at`, changing at `rate`. It is exact for those that
-    /// enter linearly, and by fourth-order differences for varying parameters. Leaves the terms evaluated elsewhere.
+    /// Returns the derivative of the gradient at q along the load path: load parameters `at`, changing at `rate`. It is exact for those
+    /// that enter linearly, and by fourth-order differences for varying parameters. Leaves the terms evaluated elsewhere.
     VectorXd gradient_rate(const VectorXd& q, const LoadParameters& at, const LoadParameters& rate);
     /// Returns the derivative of the prescribed positions in the same way; zero for all other dofs.
     VectorXd prescribed_rate(const VectorXd& q, const LoadParameters& at, const LoadParameters& rate);

@@ -1,5 +1,5 @@
-// The gradient of a scene's energies by rest positions, through the shape that bodies have at rest. What supports prescribe at rest, masses and
-// loads per length or area follow X besides: the caller adds these.
+// The gradient of a scene's energies by rest positions, through the shape that bodies have at rest. What supports prescribe at rest, masses
+// and loads per length or area follow X besides: the caller adds these.
 //
 // A homogeneous deformation I + H of the rest shape at a point of an element, H = sum_k dX_k (x) g_k with the gradients g_k of the shape
 // functions, changes lambda . g by B : H, so that d(lambda . g)/dX_k = sum over points B g_k (terms/solid/tetrahedra_rest.h,
@@ -24,7 +24,8 @@ void add_rest_forces_vjp(const Model& model, const VectorXd& lambda, VectorXd& o
 /// Adds s . dd/dX of the strains d of all elastic terms at the last evaluated state.
 void add_rest_strains_vjp(const ViscousTerms& terms, const StrainSet& stresses, VectorXd& out);
 
-/// Returns the names of the energies and forces that have no derivative by rest positions, which add_rest_vjp() would leave out.
+/// Returns the names of the energies and forces that have no derivative with respect to rest positions, which add_rest_vjp() would leave
+/// out.
 std::vector<std::string_view> without_rest_gradient(const Model& model);
 
 }  // namespace magshell

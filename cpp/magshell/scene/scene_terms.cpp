@@ -34,6 +34,7 @@
 namespace magshell {
 namespace {
 
+// Returns the edge moment at an edge of a three-node shell, with its angle at rest to the direction node.
 EdgeMomentTerm::EdgeMoment couple_of(const EdgeMomentInput& given, const TriangleMesh& mesh,
                                      const Shell& shell, const Nodes& at) {
     const bool forward = mesh.edge_faces()(given.edge, 0) != TriangleMesh::none;
@@ -307,7 +308,7 @@ void Builder::add_joints(const SceneInput& input) {
     const auto corners = [&](Index part) { return part < 0 ? nullptr : bodies_.rigid_nodes()[part].data(); };
     std::vector<JointTerm::Input> joints;
     std::vector<DamperTerm::Input> damped;
-    std::vector<TorqueTerm::Input> twisted;
+    std::vector<TorqueTerm::Input> loaded;
     for (const SkeletonInput& skeleton : input.skeletons)
         for (std::size_t k = 0; k < skeleton.links.size(); ++k) {
             if (skeleton.owners[k].empty()) continue;
@@ -315,12 +316,12 @@ void Builder::add_joints(const SceneInput& input) {
             const Index *parent = corners(joint.parent < 0 ? -1 : skeleton.links[joint.parent]),
                         *child = corners(skeleton.links[k]);
             joints.push_back({skeleton.owners[k], joint, parent, child});
-            if (joint.served)
+            if (joint.has_servo)
                 joints.push_back({skeleton.owners[k], joint, parent, child, JointTerm::Act::ball_servo});
-            if (joint.coned)
+            if (joint.has_cone)
                 joints.push_back({skeleton.owners[k], joint, parent, child, JointTerm::Act::cone});
-            if (joint.damped) damped.push_back({skeleton.owners[k], joint, parent, child});
-            if (joint.twisted) twisted.push_back({skeleton.owners[k], parent, child});
+            if (joint.has_damper) damped.push_back({skeleton.owners[k], joint, parent, child});
+            if (joint.has_torque) loaded.push_back({skeleton.owners[k], parent, child});
         }
     for (const ClosureInput& closure : input.closures)
         joints.push_back({closure.owner, Joint{.origin = closure.place}, corners(closure.parent),
@@ -335,24 +336,24 @@ void Builder::add_joints(const SceneInput& input) {
         out_.dampers.add(term.get());
         out_.energies.push_back(std::move(term));
     }
-    if (twisted.empty()) return;
-    out_.energies.push_back(std::make_unique<TorqueTerm>("joints", twisted, bodies_.nodes().rest, registry_));
+    if (loaded.empty()) return;
+    out_.energies.push_back(std::make_unique<TorqueTerm>("joints", loaded, bodies_.nodes().rest, registry_));
 }
 
 void Builder::add_wrenches(const SceneInput& input) {
     std::vector<BodyForceTerm::Input> forced;
-    std::vector<TorqueTerm::Input> twisted;
+    std::vector<TorqueTerm::Input> loaded;
     for (std::size_t k = 0; k < input.rigid.size(); ++k) {
         const RigidInput& body = input.rigid[k];
         const Index* corners = bodies_.rigid_nodes()[k].data();
         if (body.has_force) forced.push_back({body.owner, corners});
-        if (body.has_torque) twisted.push_back({body.owner, nullptr, corners});
+        if (body.has_torque) loaded.push_back({body.owner, nullptr, corners});
     }
     if (!forced.empty())
         out_.energies.push_back(std::make_unique<BodyForceTerm>(forced, bodies_.nodes().rest, registry_));
-    if (!twisted.empty())
+    if (!loaded.empty())
         out_.energies.push_back(
-            std::make_unique<TorqueTerm>("wrenches", twisted, bodies_.nodes().rest, registry_));
+            std::make_unique<TorqueTerm>("wrenches", loaded, bodies_.nodes().rest, registry_));
 }
 
 void Builder::add_solids(const SceneInput& input) {

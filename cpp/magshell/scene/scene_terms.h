@@ -1,5 +1,5 @@
-// SceneTerms: everything that acts in a scene, made once from its description: terms of the energy, forces, and the loops over elements
-// that they share.
+// SceneTerms holds the terms of a scene: those of the energy, the forces without an energy, and the loops over elements that they share. It is
+// made once from the description of the scene.
 #pragma once
 
 #include <memory>
@@ -42,9 +42,9 @@ struct SceneTerms {
     std::vector<std::unique_ptr<Term>> energies;  // their order is that of summation
     std::vector<std::unique_ptr<ForceTerm>> forces;
 
-    // The same terms by what they are asked for.
+    // The same terms, sorted by the questions that Model asks them.
     std::vector<std::vector<const Term*>> of_body;  // those that are assembled by the blocks of each body
-    std::vector<const Term*> restricting;           // those without an energy in some states
+    std::vector<const Term*> restricting;           // those that have no energy in some states
     std::vector<LowRankTerm*> low_rank;
     std::vector<const OperatorTerm*> operators;
     const OwnFieldTerm* own_field = nullptr;
@@ -53,7 +53,7 @@ struct SceneTerms {
     std::vector<const SolidTerm*> solids;
     std::vector<const MuscleTerm*> muscles;
     Contacts contacts;
-    Capabilities capabilities;  // of all together
+    Capabilities capabilities;  // union of those of all terms
 
     /// Returns a term of a shell, "membrane" or "bending".
     const ElasticTerm& elastic_term(Index shell, std::string_view name) const;

@@ -21,7 +21,7 @@ class TimeVaryingParameters {
 
     /// Copies the numbers from load parameters into the vector of all values. Returns true if any of them changed.
     bool update(const LoadParameters& load_parameters, VectorXd& values) const;
-    /// Moves the gradient by these values to the gradient by load parameters.
+    /// Moves the gradient with respect to these values to the gradient with respect to load parameters.
     void move_gradient(Gradient& gradient) const;
 
   private:

@@ -6,11 +6,12 @@
 
 namespace magshell {
 
-// Tolerances. Newton's method squares small steps: what is left after a last step of a thousandth of the bodies' extent is a displacement
-// hidden by round-off, as it changes an energy near its minimum by its square. [-] See test_fine_roof_takes_small_steps.
-constexpr double settled_step = 1e-3;
-constexpr double hidden_part = settled_step * settled_step, negligible_length = 1e-9,
-                 energy_tolerance = 1e-12;
+// Displacements over the extent of the bodies [-]. Newton's method squares a small step: after a last step of a thousandth a millionth
+// remains, whose square, by which it changes an energy near its minimum, is hidden by round-off; see test_fine_roof_takes_small_steps.
+constexpr double settled_step = 1e-3, hidden_part = settled_step * settled_step;
+constexpr double negligible_length = 1e-9;  // [-] of a line search; see test_strip_folds_onto_itself
+constexpr double energy_tolerance =
+    1e-12;  // [-] round-off of a sum of energies; see test_hard_case_reaches_its_answer
 // Displacement over the extent below which a step has settled, at an equilibrium or a saddle. [-] See
 // test_a_compressed_strip_leaves_the_saddle.
 constexpr double settled_part = 1e-4;
@@ -22,7 +23,7 @@ constexpr double large_factor = step_factor * step_factor, largest_factor = larg
 // Parts of a whole: a reduction that counts as progress (the curvature condition, N&W 3.1), and agreement with a model that is good
 // (N&W 4.1). [-] See test_strip_folds_onto_itself and test_a_semi_cylinder_pulled_and_pushed.
 constexpr double progress_part = 1.0 / step_factor, good_part = 1.0 / large_factor;
-// What is small beside another, and what is negligible. [-] See test_state_of_an_early_end_is_an_equilibrium.
+// Parts that are small beside the whole, and negligible. [-] See test_state_of_an_early_end_is_an_equilibrium.
 constexpr double small_part = 0.1, negligible_part = 0.01;
 
 // Attempts at one thing and rounds of one method, at most. See test_small_load_on_a_shallow_roof and test_hard_case_reaches_its_answer.

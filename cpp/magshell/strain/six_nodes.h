@@ -18,7 +18,7 @@ constexpr int middle(int i) {
 /// Gauss points of an edge: (1 -+ 1/sqrt(3)) / 2, each with weight 1/2.
 constexpr std::array<double, 2> gauss = {0.21132486540518711775, 0.78867513459481288225};
 
-/// Returns the derivatives by s, at position s of an edge, of the shape functions of its two ends and its
+/// Returns the derivatives with respect to s, at position s of an edge, of the shape functions of its two ends and its
 /// middle node.
 constexpr std::array<double, 3> along(double s) {
     return {4.0 * s - 3.0, 4.0 * s - 1.0, 4.0 - 8.0 * s};

@@ -4,7 +4,8 @@
 //
 //   sigma = c (s - s^)/(a dt)
 //
-// which approximates c s' with the order of the time integrator and a symmetric matrix. strains() are the s, and stresses() the products c s.
+// which approximates c s' with the order of the time integrator and a symmetric matrix. strains() are the s, and stresses() the products c
+// s.
 #pragma once
 
 #include "magshell/terms/shell/elastic_term.h"
@@ -13,8 +14,8 @@ namespace magshell {
 
 class DampedTerm : public ElasticTerm {
   public:
-    /// rates() returns ds/dt at q for node velocities v. rates_vjp() adds the gradients by q, v and parameters
-    /// of a function of these rates, given its gradient by them.
+    /// rates() returns ds/dt at q for node velocities v. rates_vjp() adds the gradients with respect to q, v and parameters
+    /// of a function of these rates, given its gradient with respect to them.
     virtual Strains rates(const double* q, const double* v) const = 0;
     virtual void rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q,
                            VectorXd& by_v, Gradient& out) const = 0;

@@ -28,7 +28,7 @@ struct Kinematics {
     double rate = 0.0;  // 1/tau
 };
 
-/// Gradients by the arguments of a force other than the end of the stage.
+/// Gradients with respect to the arguments of a force other than the end of the stage.
 struct KinematicsGradient {
     VectorXd velocity, acceleration, begin;
     LoadParameters begin_load_parameters;  // load parameters at the beginning of the step
@@ -58,7 +58,7 @@ class ForceTerm {
     virtual void add_stiffness(const Kinematics& /*at*/, std::vector<PairStiffness>& /*out*/) const {}
 
     /// Adds, at the last evaluated state, lambda . df/dv, lambda . df/dw and lambda . df/d(begin) to `by`, and
-    /// - lambda . df/dk to the gradient by parameters.
+    /// - lambda . df/dk to the gradient with respect to parameters.
     virtual void vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
                      KinematicsGradient& by, Gradient& out) const = 0;
 

@@ -14,7 +14,7 @@ Vec3 row(const VectorXd& rows, Index node) {
     return rows.segment<3>(3 * node);
 }
 
-// Adds the gradient by the mass of a node, a third to each of its three dofs, which have the same mass.
+// Adds the gradient with respect to the mass of a node, a third to each of its three dofs, which have the same mass.
 void add_to_mass(double gradient, Index node, VectorXd& by_masses) {
     by_masses.segment<3>(3 * node).array() += gradient / 3.0;
 }

@@ -41,17 +41,18 @@ class FreeBody {
     void make_rigid(const VectorXd& predicted, VectorXd& q) const {
         nodes_->set_positions(nodes_->pose(predicted), q);
     }
-    /// Adds the gradients by positions, velocities and masses of all dofs. motion: what motion(q, v) returned; by: the
-    /// gradients by it.
+    /// Adds the gradients with respect to positions, velocities and masses of all dofs. motion: what motion(q, v) returned; by: the
+    /// gradients with respect to it.
     void motion_vjp(const RigidMotion& motion, const VectorXd& q, const VectorXd& v, const RigidMotion& by,
                     VectorXd& by_q, VectorXd& by_v, VectorXd& by_masses) const;
-    /// Adds the gradients by the masses of all dofs, given those by the inverse inertia and by a displacement of all arms.
+    /// Adds the gradients with respect to the masses of all dofs, given those with respect to the inverse inertia and to a displacement of
+    /// all arms.
     void inertia_vjp(const Mat3& by_inverse_inertia, const Vec3& by_arms, VectorXd& by_masses) const;
     /// Adds a matrix times rho to the rows of its nodes.
     void add(const Mat3& matrix, VectorXd& rows) const {
         for (std::size_t k = 0; k < arms_.size(); ++k) rows.segment<3>(3 * nodes()[k]) += matrix * arms_[k];
     }
-    /// Returns the gradient by that matrix, given the one by the rows. Adds that by the arms.
+    /// Returns the gradient with respect to that matrix, given the one with respect to the rows. Adds that with respect to the arms.
     Mat3 add_vjp(const Mat3& matrix, const VectorXd& by_rows, Vec3& by_arms) const;
 
   private:

@@ -32,17 +32,17 @@ class TorqueFreeRotation {
         /// Returns the state with this rotation and momentum.
         static State of(const Mat3& inverse_inertia, const Mat3& turn, const Vec3& momentum);
     };
-    /// Gradients by the three matrices of a state.
+    /// Gradients with respect to the three matrices of a state.
     struct StateGradient {
         Mat3 turn = Mat3::Zero(), velocities = Mat3::Zero(), accelerations = Mat3::Zero();
     };
-    /// Gradients by the arguments of the constructor.
+    /// Gradients with respect to the arguments of the constructor.
     struct Gradients {
         Vec3 momentum = Vec3::Zero();
         Mat3 inverse_inertia = Mat3::Zero();
         double dt = 0.0;
 
-        /// Goes back through State::of, for a state with this gradient. Returns the gradient by its turn.
+        /// Goes back through State::of, for a state with this gradient. Returns the gradient with respect to its turn.
         Mat3 add_state(const Mat3& inverse_inertia, const State& state, const StateGradient& by,
                        Vec3& by_momentum);
     };
@@ -57,7 +57,7 @@ class TorqueFreeRotation {
     const State& at(std::size_t k) const { return states_[k]; }
     std::size_t size() const { return states_.size(); }
     const Mat3& inverse_inertia() const { return inverse_inertia_; }
-    /// Adds the gradients by the arguments, given one by each state.
+    /// Adds the gradients with respect to the arguments, given one by each state.
     void vjp(std::span<const StateGradient> by, Gradients& out) const;
 
   private:

@@ -28,7 +28,7 @@ struct Viscosity {
     double stiffness_damping = 0.0;       // beta [s]
     std::vector<MaxwellBranch> branches;  // moduli may be zero, of which gradients are computed as well
     double elastic = 1.0;                 // factor of the elastic stress; 0: none
-    bool damping_varies = false;          // the gradient by a damping of zero is wanted
+    bool damping_varies = false;          // the gradient with respect to a damping of zero is wanted
 
     bool any() const { return stiffness_damping != 0.0 || damping_varies || maxwell(); }
     bool maxwell() const { return !branches.empty(); }

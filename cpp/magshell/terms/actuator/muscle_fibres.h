@@ -120,8 +120,8 @@ class MuscleFibres {
 
     std::size_t bytes() const { return loop.bytes() + bytes_of(pieces_) + bytes_of(segments_); }
 
-    /// Gradients of an element by its parameters. `pulled` is the part of each node in the gradient by m, sum_k g_k pulled_k
-    /// = F^T b, at each point, where b is the gradient by F m.
+    /// Gradients of an element with respect to its parameters. `pulled` is the part of each node in the gradient with respect to m, sum_k g_k pulled_k
+    /// = F^T b, at each point, where b is the gradient with respect to F m.
     struct Found {
         SimdDouble strength{0.0}, activation{0.0};
         SimdDouble pulled[points][N];
@@ -129,7 +129,7 @@ class MuscleFibres {
         Found() {
             for (SimdDouble(&of_point)[N] : pulled) std::fill_n(of_point, N, SimdDouble(0.0));
         }
-        /// Adds b = `by`, the gradient by F m at a point; F is the deformation gradient of the nodes x.
+        /// Adds b = `by`, the gradient with respect to F m at a point; F is the deformation gradient of the nodes x.
         void add(int p, const SimdVec3 x[N], const SimdVec3& by) {
             for (int k = 0; k < N; ++k) pulled[p][k] += dot(x[k], by);
         }

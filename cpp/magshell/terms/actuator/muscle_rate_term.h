@@ -160,7 +160,7 @@ class MuscleRateTerm final : public ForceTerm {
     }
 
   private:
-    /// The tension T and its derivatives by l, l', w and a.
+    /// The tension T and its derivatives with respect to l, l', w and a.
     struct Point {
         DeformedFibre fibre;
         SimdVec3 moves;   // y'

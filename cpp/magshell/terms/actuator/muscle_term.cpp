@@ -225,7 +225,7 @@ class MuscleEnergy final : public MuscleTerm {
         SimdDouble along[points], across[points];
     };
 
-    // The power of a point along a motion, with its derivatives by F m and by the rate of F m.
+    // The power of a point along a motion, with its derivatives with respect to F m and to the rate of F m.
     struct Pull {
         FibreLaw::Response law;
         SimdDouble along, scale, power;

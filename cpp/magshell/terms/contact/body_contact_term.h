@@ -85,7 +85,7 @@ class BodyContactTerm final : public Term, public RestShapeTerm {
     void set_psd_projection(bool project_psd) override { psd_projection_ = project_psd; }
     /// Adds the magnitude [N] of the forces that cancel within pair forces at the last evaluated state.
     void add_cancelling_normal_forces(VectorXd& out) const;
-    /// Adds the gradient by the parameters of a pair's contact. factor: the factor of the stiffness that `active` was
+    /// Adds the gradient with respect to the parameters of a pair's contact. factor: the factor of the stiffness that `active` was
     /// computed with.
     void add_vjp(const ActiveContact& active, const PairEnergy::ByLaw& by, const FrictionLaw& by_friction,
                  double factor, VectorXd& by_values) const;
@@ -123,7 +123,7 @@ class BodyContactTerm final : public Term, public RestShapeTerm {
              Gradient& out) override;
     void add_rest_vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                       VectorXd& out) override;
-    /// Returns what adds up the gradient by rest positions from that of each pair.
+    /// Returns what adds up the gradient with respect to rest positions from that of each pair.
     ContactRest rest_gradient() const { return {candidates_.phase(), nodes_.rest}; }
     std::size_t bytes() const override;
 

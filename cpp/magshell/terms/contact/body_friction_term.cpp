@@ -3,7 +3,7 @@
 namespace magshell {
 namespace {
 
-// The motion of a pair for derivatives by the normal force alone.
+// The motion of a pair for derivatives with respect to the normal force alone.
 const PairVectors no_motion = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
 
 }  // namespace

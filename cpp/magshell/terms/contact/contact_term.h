@@ -115,12 +115,12 @@ class ContactTerm final : public Term {
     }
     const ContactLaw& law(const ActiveContact& active) const { return laws_[active.contact]; }
     ObstacleState obstacle_state(Index obstacle, const LoadParameters& load_parameters) const;
-    /// Adds the gradient by an obstacle's placement and pose of a function of the distance, the normal and the relative velocity at a
-    /// point, as ObstacleState::vjp does.
+    /// Adds the gradient with respect to an obstacle's placement and pose of a function of the distance, the normal and the relative
+    /// velocity at a point, as ObstacleState::vjp does.
     static void obstacle_vjp(const ActiveContact& active, const ObstacleState& obstacle, double by_distance,
                              const Vec3& by_normal, const Vec3& by_relative_velocity, ObstacleGradient& out);
-    /// Adds the gradient of a function of a point's normal force and friction, given its derivatives by the
-    /// normal force, by the friction law and by the obstacle. Gradients by the obstacle's pose go to
+    /// Adds the gradient of a function of a point's normal force and friction, given its derivatives with respect to the
+    /// normal force, the friction law and the obstacle. Gradients with respect to the obstacle's pose go to
     /// `by_load_parameters`, which belong to the time at which the obstacle had that pose.
     void add_vjp(const ActiveContact& active, double by_force, const ContactLaw& by_friction,
                  const ObstacleGradient& by_obstacle, VectorXd& by_values,

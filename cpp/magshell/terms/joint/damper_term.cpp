@@ -105,7 +105,7 @@ Strains DamperTerm::rates(const double* q, const double* v) const {
     return out;
 }
 
-// The gradient by a joint's axis. A coordinate does not depend on the axis itself, as the links rotate about
+// The gradient with respect to a joint's axis. A coordinate does not depend on the axis itself, as the links rotate about
 // it. Its rate does wherever node velocities contain motions that the joint does not allow, which is the case
 // for the velocities of finite steps.
 //

@@ -25,7 +25,7 @@ class FaceEnergy {
 
 /// The term of a kernel. A kernel provides `name`; `inputs`, its parameters per face; a constructor from the
 /// corners x[3]; energy(in); gradient(in, g); hessian(in, h) as lower blocks; and rate_by_inputs(in, rate,
-/// out), the derivatives of rate . gradient by each parameter. The load factor scales the energy.
+/// out), the derivatives of rate . gradient with respect to each parameter. The load factor scales the energy.
 template <class Kernel>
 class FaceEnergyTerm final : public Term {
   public:

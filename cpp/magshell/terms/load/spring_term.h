@@ -2,10 +2,10 @@
 //
 //   E = 1/2 k (s - r)^2,     force k (s - r) + c s'                                                    [J], [N]
 //
-// along the spring, with a stiffness k [N/m] (of a foundation: [N/m3] times the area that the spring stands for), a length at rest r [m] and
-// a damping c [N s/m]. t = sum_j w_j x_j - g is the vector along the spring, between weighted sums of node positions or from the ground point
-// g. s is its length |t|, rounded at zero, or its component e . t along a fixed direction e, where r = 0: a foundation (Winkler) has three
-// such springs at each vertex, or one along its direction.
+// along the spring, with a stiffness k [N/m] (of a foundation: [N/m3] times the area that the spring stands for), a length at rest r [m]
+// and a damping c [N s/m]. t = sum_j w_j x_j - g is the vector along the spring, between weighted sums of node positions or from the ground
+// point g. s is its length |t|, rounded at zero, or its component e . t along a fixed direction e, where r = 0: a foundation (Winkler) has
+// three such springs at each vertex, or one along its direction.
 //
 // The load factor does not scale them.
 #pragma once
@@ -74,14 +74,14 @@ class SpringTerm final : public DampedTerm {
         /// Returns the vector t along the spring.
         Vec3 along(const double* q) const { return weighted(q) - ground; }
     };
-    /// The elongation of a spring with its first and second derivatives by t.
+    /// The elongation of a spring with its first and second derivatives with respect to t.
     struct Local {
         double value = 0.0;
         Vec3 slope = Vec3::Zero();
         Mat3 curvature = Mat3::Zero();
     };
     static Local local(const Spring& spring, const Vec3& along);
-    /// Returns the viscous stress of a stage over the damping, and its derivative by s.
+    /// Returns the viscous stress of a stage over the damping, and its derivative with respect to s.
     double viscous_strain(std::size_t k) const {
         return history_.shift
                    ? history_.scale * now_[k].value - history_.shift->number(static_cast<Index>(k), 0)

@@ -42,7 +42,7 @@ void WaterTerm::evaluate(const Kinematics& at, const LoadParameters&, Residual& 
     });
 }
 
-// All corners of a face have the same force. The symmetric part of its derivative by the motion of the face as
+// All corners of a face have the same force. The symmetric part of its derivative with respect to the motion of the face as
 // a whole goes into the system matrix, which stays positive definite; the rest goes into the nonsymmetric
 // tangent.
 void WaterTerm::assemble(const Kinematics& at, const LoadParameters&, bool, SystemMatrix& out,

@@ -34,7 +34,7 @@ class CornerWeights {
         for (int k = 0; k < 4; ++k) weights[k] = 0.25 + offsets_[k].dot(from_middle);
         return weights;
     }
-    /// Returns the derivative by the vector or the point, given those by its weights.
+    /// Returns the derivative with respect to the vector or the point, given those with respect to its weights.
     Vec3 gradient(const Each& by_weights) const {
         Vec3 sum = Vec3::Zero();
         for (int k = 0; k < 4; ++k) sum += by_weights[k] * offsets_[k];

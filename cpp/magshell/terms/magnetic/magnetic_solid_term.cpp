@@ -210,8 +210,8 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies,
         return Element::shape_derivatives(p) * rest.gradients[p];
     }
 
-    // Returns the derivative by a homogeneous deformation I + H of the rest shape at a point of b . M~_r V_p with b V_p = by_magnetization_.
-    // It turns F into F (I - H) and V_p into V_p (1 + tr H), so that b . M~_r becomes b . (I - H) M~_r.
+    // Returns the derivative with respect to a homogeneous deformation I + H of the rest shape at a point of b . M~_r V_p with b V_p =
+    // by_magnetization_. It turns F into F (I - H) and V_p into V_p (1 + tr H), so that b . M~_r becomes b . (I - H) M~_r.
     Mat3 by_deformation(Index t, int p) const {
         const Vec3& by = by_magnetization_[t * points + p];
         const auto& alpha = elements_[t / SimdDouble::width].at[p].alpha;
@@ -301,7 +301,7 @@ class MagneticSolidTerm final : public AppliedFieldTerm, public ElementEnergies,
     ParameterSlice magnetization_;
     std::array<double, N> shapes_[points];
     std::vector<Points> elements_;
-    // The gradient by the magnetization of each point, from the last vjp(); of one that turns also the applied field and R.
+    // The gradient with respect to the magnetization of each point, from the last vjp(); of one that turns also the applied field and R.
     std::vector<Vec3> by_magnetization_;
     std::vector<FluxAndRate> applied_;
     std::vector<Mat3> rotations_;

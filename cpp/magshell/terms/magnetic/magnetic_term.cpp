@@ -19,8 +19,8 @@
 namespace magshell {
 namespace {
 
-// In a uniform field nothing is sampled. If the magnetization is linear in the positions too, the force does not
-// depend on the deformation, and there is no Hessian to add.
+// The magnetic energy of the faces of a surface. A uniform field is not sampled. If the magnetization is linear in the positions as well,
+// the force does not depend on the deformation, and the Hessian is zero.
 template <class Law>
 class MagneticTerm final : public AppliedFieldTerm, public ElementEnergies, public RestShapeTerm {
   public:
@@ -88,11 +88,11 @@ class MagneticTerm final : public AppliedFieldTerm, public ElementEnergies, publ
     const TotalAppliedField field_;
     ParameterSlice magnetization_, thickness_;  // values
     std::optional<ParameterSlice>
-        finely_;  // value, 1 for a face that samples finely, if the field can vary in space
+        finely_;  // value: 1 for a face that samples the field finely; only if the field can vary in space
     std::vector<double> thicknesses_;
     FaceSampling sampling_;
     LargeVector<typename Law::Element> elements_;
-    // The gradient by the magnetization of each face, and the applied field there, from the last vjp().
+    // The gradient with respect to the magnetization of each face, and the applied field there, from the last vjp().
     std::vector<Vec3> by_magnetization_;
     std::vector<FluxAndRate> applied_;
     Fields fields_;  // sampled for the current assembly
@@ -248,7 +248,8 @@ void MagneticTerm<Law>::assemble(const ElementBlock& element_block, const double
 //
 //   D = - A~ h sum_p w_p (M' . B_p + M . G_p v_p),   M' = alpha f_1' + beta f_2' + gamma n',
 //
-// is linear in (alpha, beta, gamma) and in the field. By the thickness it is, with x_p = ... + z_p h n and C_p = d2(M . B_p)/dx2,
+// is linear in (alpha, beta, gamma) and in the field. Its derivative with respect to the thickness h, on which the points x_p = ... + z_p h
+// n depend, is with C_p = d2(M . B_p)/dx2
 //
 //   dD/dh = D/h - A~ h sum_p w_p z_p (M' . G_p n + n . C_p v_p + M . G_p n').
 template <class Law>
@@ -377,11 +378,12 @@ void MagneticTerm<Law>::find_neighbours() {
 //   (|d_i| / |e_i|)^2 (G(x_b + e_i)^T m - F - F' e_i).
 //
 // Across an edge of the border it is taken as the mean of the others. Through the thickness h the force changes too: div F'' = 0 in
-// free space, so its second derivative along the normal is minus that in the plane, which S = s I takes to be 1/s of F'' : S; together
+// free space, so its second derivative along the normal is minus the sum of those in the plane. With S = s I that sum is F'' : S / s;
+// together
 //
 //   1/2 F'' : S (1 - h^2 / 12 s),   s = tr S / 2.
 //
-// The error of faces that sample the field finely cannot be told from their samples.
+// The error of faces that sample the field finely cannot be estimated from their samples.
 template <class Law>
 double MagneticTerm<Law>::field_sampling_error(const double* q, const LoadParameters& load_parameters,
                                                double extent) {

@@ -20,7 +20,7 @@ namespace magshell {
 
 class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTerm {
   public:
-    BendingTerm(const Shell& sheet, Index body, const ColoredLoop& element_blocks, const GrowthForm& growth,
+    BendingTerm(const Shell& shell, Index body, const ColoredLoop& element_blocks, const GrowthForm& growth,
                 const Nodes& nodes, const SystemMatrix& matrix, Registry& registry);
 
     std::string_view name() const override { return "bending"; }
@@ -45,7 +45,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
     /// grown() returns the natural (stress-free) configuration of a face; natural_angle_changes() returns the
     /// angles [rad] of its edges there, relative to the reference shape.
     GrownFace grown(Index face) const {
-        return {sheet_.rest_corners(face), growth_.growth(face), growth_.curvature(face)};
+        return {shell_.rest_corners(face), growth_.growth(face), growth_.curvature(face)};
     }
     Vec3 natural_angle_changes(Index face) const;
 
@@ -61,24 +61,25 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
     SidesOfGroup sides_of(Index group) const {
         SidesOfGroup sides;
         for (int lane = 0; lane < SimdDouble::width; ++lane)
-            sides[lane] = &sheet_.sides[element_of(group, lane, sheet_.n_faces())];
+            sides[lane] = &shell_.sides[element_of(group, lane, shell_.n_faces())];
         return sides;
     }
-    Index face_groups() const { return groups_for(sheet_.n_faces()); }
+    Index face_groups() const { return groups_for(shell_.n_faces()); }
     template <class Body>
     void each_group(const Body& body) const {
         element_blocks_.each(
             [&](const ElementBlock& element_block) { FaceLoop::over_groups(element_block, body); });
     }
-    void measure(Index group, const double* q, const std::vector<double>& changes, SimdDouble delta[3]) const;
+    void edge_strains(Index group, const double* q, const std::vector<double>& changes,
+                      SimdDouble delta[3]) const;
     void begin_strains(const double* q) { store_dihedrals(q); }
     void begin_rates(const double* p) { store_rates(p); }
     void strain(Index group, const double* q, SimdDouble d[3]) const {
-        measure(group, q, angle_changes_, d);
+        edge_strains(group, q, angle_changes_, d);
         if (natural_angles_.empty()) return;
         for (int i = 0; i < 3; ++i) d[i] -= natural_angles_[group][i];
     }
-    void rate(Index group, const double* p, SimdDouble d[3]) const { measure(group, p, rates_, d); }
+    void rate(Index group, const double* p, SimdDouble d[3]) const { edge_strains(group, p, rates_, d); }
     const Symmetric3& stiffness(Index group) const { return stiffness_[group]; }
     /// Returns the derivative of each reference dihedral angle with respect to its nodes along the mean normal
     /// of the two adjacent faces.
@@ -105,13 +106,14 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
     // lambda, whose rates of the dihedral angles store_rates() has stored.
     template <class Body>
     void each_face(const double* q, const double* lambda, const Body& body);
-    // Adds the gradient by rest positions through the angles from which strains are measured, from that by these angles of each face.
+    // Adds the gradient with respect to rest positions through the angles from which strains are measured, from that with respect to these
+    // angles of each face.
     void add_rest_angles_vjp(std::vector<Vec3> by_angles, VectorXd& out) const;
     void assemble_faces(Index group, SystemMatrix& out) const;
     void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                             SystemMatrix& out) const;
 
-    const Shell& sheet_;
+    const Shell& shell_;
     const Index body_;
     const ColoredLoop& element_blocks_;
     const Nodes& nodes_;
@@ -126,7 +128,7 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
     // natural_angle_changes() of each SIMD vector, where anything grows
     std::vector<std::array<SimdDouble, 3>> natural_angles_;
     // For each dihedral stencil at the last evaluated state: theta - theta~, the rate of theta along the last
-    // extrapolated step, and its gradient by the four nodes.
+    // extrapolated step, and its gradient with respect to the four nodes.
     std::vector<double> angle_changes_, rates_;
     LargeVector<std::array<double, 12>> gradients_;
 };

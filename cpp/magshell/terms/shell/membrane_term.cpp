@@ -137,8 +137,8 @@ void MembraneTerm::rate(Index group, const double* p, SimdDouble d[3]) const {
 }
 
 void MembraneTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
-    // For both parts of each triangle: lambda . g, and its derivative by the Poisson ratio. They are stored first and added below, outside the
-    // parallel loop, because a part may belong to a face that another thread processes.
+    // For both parts of each triangle: lambda . g, and its derivative with respect to the Poisson ratio. They are stored first and added
+    // below, outside the parallel loop, because a part may belong to a face that another thread processes.
     using OfShares = std::array<Eigen::Vector2d, 2>;
     std::vector<OfShares> by_shares(surface_.n_faces(),
                                     OfShares{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()});
@@ -228,7 +228,7 @@ void MembraneTerm::add_rest_strains_vjp(const Strains& stresses, VectorXd& out) 
     add_by_shape(strains_by_shape(stresses), std::vector<double>(surface_.n_faces(), 0.0), out);
 }
 
-// by_first: the derivative by the first part of each triangle, but for that through the mean growth.
+// by_first: the derivative with respect to the first part of each triangle, but for that through the mean growth.
 void MembraneTerm::add_by_shape(const std::vector<ByFace>& by_faces, std::vector<double> by_first,
                                 VectorXd& out) const {
     for (Index f = 0; f < surface_.n_faces(); ++f) {

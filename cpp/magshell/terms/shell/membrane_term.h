@@ -56,11 +56,13 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm>, public RestShape
     void rate(Index group, const double* p, SimdDouble d[3]) const;
     RestFace rest_face(Index face) const;
     Mat3 mean_growth(Index face) const;
-    // Derivatives by the shape of a triangle, in world axes: by a homogeneous deformation at rest, and by the growth tensor in its plane.
+    // Derivatives with respect to the shape of a triangle, in world axes: by a homogeneous deformation at rest, and by the growth tensor in
+    // its plane.
     struct ByFace {
         Mat3 deformation, growth;
     };
-    // Return the derivatives by the shape of each triangle: of lambda . g at the last evaluated state, and of the strains times stresses.
+    // Return the derivatives with respect to the shape of each triangle: of lambda . g at the last evaluated state, and of the strains
+    // times stresses.
     std::vector<ByFace> by_shape(const double* q, const double* lambda) const;
     std::vector<ByFace> strains_by_shape(const Strains& stresses) const;
     template <class ByGrowth>
@@ -68,7 +70,8 @@ class MembraneTerm final : public StrainScaffold<MembraneTerm>, public RestShape
     void add_by_shape(const std::vector<ByFace>& by_faces, std::vector<double> by_first, VectorXd& out) const;
     // Returns, for the triangles with parts of two faces, the derivative of lambda . g by the first part through the stiffness.
     std::vector<double> by_first_part(const double* q, const double* lambda) const;
-    // Adds the gradient by rest positions through the parts of two faces in a triangle, from the derivative by the first part.
+    // Adds the gradient with respect to rest positions through the parts of two faces in a triangle, from the derivative with respect to
+    // the first part.
     void add_parts_vjp(const std::vector<double>& by_first, VectorXd& out) const;
     void add_growth_vjp(const std::vector<ByFace>& by_faces, Gradient& out) const;
     const Symmetric3& stiffness(Index group) const { return elements_[group].stiffness; }

@@ -1,4 +1,4 @@
-// ShellGrowth: the growth tensor and the natural curvature of a shell's faces, and the gradients by them. Both
+// ShellGrowth: the growth tensor and the natural curvature of a shell's faces, and the gradients with respect to them. Both
 // may change during a solve.
 #pragma once
 
@@ -34,7 +34,7 @@ class ShellGrowth {
     Mat3 growth(Index face) const { return growth_.at(row(growth_, face), 1.0); }
     Mat3 curvature(Index face) const { return curvature_.at(row(curvature_, face), 0.0); }
 
-    /// Adds the gradient by both tensors of a face.
+    /// Adds the gradient with respect to both tensors of a face.
     void add_vjp(Index face, const Mat3& by_growth, const Mat3& by_curvature, Gradient& out) const;
 
     std::size_t bytes() const {

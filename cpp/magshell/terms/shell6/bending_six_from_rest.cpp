@@ -17,7 +17,7 @@ void BendingSixTerm::count_rotations_from_rest(bool from_rest) {
 
 void BendingSixTerm::prepare_assembly(const double* q, const LoadParameters&) {
     if (!from_rest_) return;
-    side_rotations_.resize(sheet_.dihedrals.size());
+    side_rotations_.resize(shell_.dihedrals.size());
     element_blocks_.each([&](const ElementBlock& element_block) {
         for (Index first = element_block.first_dihedral; first < element_block.last_dihedral;
              first += SimdDouble::width) {
@@ -37,10 +37,10 @@ void BendingSixTerm::prepare_assembly(const double* q, const LoadParameters&) {
 /// rotations.
 template <class Visit>
 void BendingSixTerm::each_half_rotation(const Visit& visit) const {
-    for (std::size_t h = 0; h < sheet_.dihedrals.size(); ++h) {
-        const DihedralSixStencil& fold = sheet_.dihedrals[h];
+    for (std::size_t h = 0; h < shell_.dihedrals.size(); ++h) {
+        const DihedralSixStencil& fold = shell_.dihedrals[h];
         if (!fold.right_is_face) continue;
-        const FaceSideSix& left = sheet_.sides[fold.left.face][fold.left.corner];
+        const FaceSideSix& left = shell_.sides[fold.left.face][fold.left.corner];
         for (int g = 0; g < 2; ++g)
             for (const bool on_left : {true, false}) {
                 const SideRotation& turn = side_rotations_[h][g][on_left ? 0 : 1];
@@ -71,16 +71,16 @@ void BendingSixTerm::assemble_from_rest(Index group, const double* q, SystemMatr
     loop_.gather(group, q, x);
     BendingSix(x).rows(elements_[group], rows);
     // The only nodes outside a face are the directors of clamped edges.
-    SimdVec3 held[3][2] = {};
+    SimdVec3 directors[3][2] = {};
     SimdDouble sign[3] = {};
-    std::array<bool, 3> any_held{};
+    std::array<bool, 3> any_directors{};
     for (int lane = 0; lane < SimdDouble::width; ++lane)
         for (int i = 0; i < 3; ++i) {
-            const FaceSideSix& side = sheet_.sides[loop_.element(group, lane)][i];
+            const FaceSideSix& side = shell_.sides[loop_.element(group, lane)][i];
             sign[i].set(lane, side.sign);
             if (side.dihedral < 0) continue;
-            const bool is_held = !sheet_.dihedrals[side.dihedral].right_is_face;
-            any_held[i] |= is_held;
+            const bool is_held = !shell_.dihedrals[side.dihedral].right_is_face;
+            any_directors[i] |= is_held;
             const SideNodes& at = side.on_left ? left_side : right_side;
             const std::array<int, 6> own = face_order(i);
             for (int g = 0; g < 2; ++g) {
@@ -95,7 +95,7 @@ void BendingSixTerm::assemble_from_rest(Index group, const double* q, SystemMatr
                     SimdVec3& row = rows.at[3 * i + g][own[k]];
                     set_lane(row, lane, lane_of(row, lane) + part(at.own[k]));
                 }
-                if (is_held) set_lane(held[i][g], lane, part(at.beyond));
+                if (is_held) set_lane(directors[i][g], lane, part(at.beyond));
             }
         }
     const Symmetric9 stiffness = history_.scaled(stiffness_[group]);
@@ -103,34 +103,36 @@ void BendingSixTerm::assemble_from_rest(Index group, const double* q, SystemMatr
     SimdMat3 h[21];
     rows.blocks(stiff, h);
     loop_.scatter(group, h, out);
-    SimdVec3 beside[6][6];
+    SimdVec3 by_rotation[6][6];
     for (int a = 0; a < 6; ++a)
-        for (int k = 0; k < 6; ++k) beside[a][k] = sign[a / 2] * stiff.at[3 * (a / 2) + a % 2][k];
+        for (int k = 0; k < 6; ++k) by_rotation[a][k] = sign[a / 2] * stiff.at[3 * (a / 2) + a % 2][k];
     for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
         const Index f = loop_.element(group, lane);
-        const std::array<Index, 6>& nodes = sheet_.own_nodes[f];
+        const std::array<Index, 6>& nodes = shell_.own_nodes[f];
         Index length[6];
         for (int k = 0; k < 6; ++k) length[k] = out.column_length(nodes[k]);
         for (int a = 0; a < 6; ++a)
-            if (sheet_.stencils[f].rotations[a] >= 0)
+            if (shell_.stencils[f].rotations[a] >= 0)
                 for (int k = 0; k < 6; ++k)
-                    out.add_rotation_row(face_slots_[f].rotation_nodes[a][k], length[k], beside[a][k], lane);
+                    out.add_rotation_row(face_slots_[f].rotation_nodes[a][k], length[k], by_rotation[a][k],
+                                         lane);
         add_rotations(group, lane, sign, stiffness, out);
     }
-    if (any_held[0] || any_held[1] || any_held[2]) add_held(group, held, sign, stiffness, stiff, out);
+    if (any_directors[0] || any_directors[1] || any_directors[2])
+        add_directors(group, directors, sign, stiffness, stiff, out);
 }
 
 /// Adds the blocks between the fixed directors of clamped edges and the nodes and rotations of their faces, and
 /// among directors.
-void BendingSixTerm::add_held(Index group, const SimdVec3 (&held)[3][2], const SimdDouble sign[3],
-                              const Symmetric9& stiffness, const SixNodeRows& stiff,
-                              SystemMatrix& out) const {
+void BendingSixTerm::add_directors(Index group, const SimdVec3 (&directors)[3][2], const SimdDouble sign[3],
+                                   const Symmetric9& stiffness, const SixNodeRows& stiff,
+                                   SystemMatrix& out) const {
     for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
         const Index f = loop_.element(group, lane);
-        const std::array<Index, 15>& nodes = sheet_.stencils[f].nodes;
+        const std::array<Index, 15>& nodes = shell_.stencils[f].nodes;
         const auto is_held = [&](int i) {
-            const Index fold = sheet_.sides[f][i].dihedral;
-            return fold >= 0 && !sheet_.dihedrals[fold].right_is_face;
+            const Index fold = shell_.sides[f][i].dihedral;
+            return fold >= 0 && !shell_.dihedrals[fold].right_is_face;
         };
         const auto add = [&](int row, int column, const SimdMat3& block) {
             const SystemMatrix::Slot slot = face_slots_[f].nodes[lower_index(row - 1, column)];
@@ -143,23 +145,25 @@ void BendingSixTerm::add_held(Index group, const SimdVec3 (&held)[3][2], const S
             const int row = 6 + 3 * i;
             for (int k = 0; k < 6; ++k)
                 add(row, k,
-                    outer(held[i][0], stiff.at[3 * i][k]) + outer(held[i][1], stiff.at[3 * i + 1][k]));
+                    outer(directors[i][0], stiff.at[3 * i][k]) +
+                        outer(directors[i][1], stiff.at[3 * i + 1][k]));
             for (int j = 0; j < 3; ++j) {
-                SimdVec3 felt[2];  // coupling with the strains of edge j
+                SimdVec3 stressed[2];  // coupling with the strains of edge j
                 for (int g = 0; g < 2; ++g)
-                    felt[g] = stiffness(3 * i, 3 * j + g) * held[i][0] +
-                              stiffness(3 * i + 1, 3 * j + g) * held[i][1];
+                    stressed[g] = stiffness(3 * i, 3 * j + g) * directors[i][0] +
+                                  stiffness(3 * i + 1, 3 * j + g) * directors[i][1];
                 if (is_held(j) && j <= i) {
-                    const SimdMat3 block = outer(felt[0], held[j][0]) + outer(felt[1], held[j][1]);
+                    const SimdMat3 block =
+                        outer(stressed[0], directors[j][0]) + outer(stressed[1], directors[j][1]);
                     if (j == i)
                         out.add_diagonal_block(nodes[row], block, lane);
                     else
                         add(row, 6 + 3 * j, block);
                 }
                 for (int g = 0; g < 2; ++g)
-                    if (sheet_.stencils[f].rotations[2 * j + g] >= 0)
+                    if (shell_.stencils[f].rotations[2 * j + g] >= 0)
                         out.add_rotation_row(face_slots_[f].rotation_nodes[2 * j + g][row],
-                                             out.column_length(nodes[row]), sign[j] * felt[g], lane);
+                                             out.column_length(nodes[row]), sign[j] * stressed[g], lane);
             }
         }
     }

@@ -11,9 +11,9 @@ namespace magshell {
 
 void BendingSixTerm::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda,
                                   VectorXd& out) {
-    Strains by_strains(sheet_.n_faces(), 9);
-    std::vector<ByRestFace> by_faces(sheet_.n_faces());
-    std::vector<Vec9> of_rates(sheet_.n_faces()), of_strains(sheet_.n_faces());
+    Strains by_strains(shell_.n_faces(), 9);
+    std::vector<ByRestFace> by_faces(shell_.n_faces());
+    std::vector<Vec9> of_rates(shell_.n_faces()), of_strains(shell_.n_faces());
     each_group([&](Index group) {
         SimdVec3 x[6], p[6];
         SimdDouble d[9], along[9], stresses[9], inside[9];
@@ -56,13 +56,13 @@ void BendingSixTerm::add_rest_vjp(const double* q, const LoadParameters&, const 
             by_faces[f] = found[lane];
         }
     });
-    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+    for (Index f = 0; f < shell_.n_faces(); ++f) {
         for (const six_nodes::Point& point : six_nodes::inside) {
-            const RestPointSix rest(sheet_.rest[f], point.at);
+            const RestPointSix rest(shell_.rest[f], point.at);
             const GrownFace face(rest.corners(), Mat3::Identity(), Mat3::Zero());
             const Mat2 by = compliance_by_deformation(f, face.triangle(), point.at, point.weight, of_rates[f],
                                                       of_strains[f]);
-            rest.add_by_deformation(face.in_world(-by), sheet_.own_nodes[f], out);
+            rest.add_by_deformation(face.in_world(-by), shell_.own_nodes[f], out);
         }
         add_rest_face(f, by_faces[f], out);
     }
@@ -87,7 +87,7 @@ void BendingSixTerm::strains_by_rest(Index group, const BendingSix& now, const S
     SimdDouble here[9], there[9], against[9];
     SixNodeRows rows;
     for (int lane = 0; lane < SimdDouble::width; ++lane)
-        for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet_.rest[loop_.element(group, lane)][k]);
+        for (int k = 0; k < 6; ++k) set_lane(x[k], lane, shell_.rest[loop_.element(group, lane)][k]);
     const BendingSix rest(x);
     for (int r = 0; r < 9; ++r) against[r] = -by[r];
     rest.rows(elements_[group], rows);
@@ -114,8 +114,8 @@ void BendingSixTerm::strains_by_rest(Index group, const BendingSix& now, const S
 
 // A deformation I + H at a point changes 1/J~ by - tr H / J~. s is twice the length of an edge at its Gauss points, or of its chord.
 void BendingSixTerm::add_rest_face(Index f, const ByRestFace& by, VectorXd& out) const {
-    const std::array<Vec3, 6>& rest = sheet_.rest[f];
-    const std::array<Index, 6>& nodes = sheet_.own_nodes[f];
+    const std::array<Vec3, 6>& rest = shell_.rest[f];
+    const std::array<Index, 6>& nodes = shell_.own_nodes[f];
     for (int k = 0; k < 6; ++k) out.segment<3>(3 * nodes[k]) += by.nodes[k];
     for (int p = 0; p < BendingSix::points; ++p) {
         const RestPointSix point(rest, six_nodes::inside[p].at);
@@ -141,16 +141,16 @@ void BendingSixTerm::add_rest_face(Index f, const ByRestFace& by, VectorXd& out)
 void BendingSixTerm::add_rest_angles(const Strains& by_strains, VectorXd& out) const {
     VectorXd q(3 * nodes_.n_nodes());
     for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
-    const Index n = sheet_.n_dihedrals();
+    const Index n = shell_.n_dihedrals();
     for (Index first = 0; first < n; first += SimdDouble::width) {
         const Index last = std::min<Index>(first + SimdDouble::width, n);
         for (int g = 0; g < 2; ++g) {
             SimdVec3 by_node[9];
             dihedrals_at(first, last, g, q.data()).gradient(by_node);
             for (Index h = first; h < last; ++h) {
-                const double by_angle = -moment(sheet_.dihedrals[h], g, by_strains);
+                const double by_angle = -moment(shell_.dihedrals[h], g, by_strains);
                 for (int a = 0; a < 9; ++a)
-                    if (const Index node = sheet_.dihedrals[h].nodes[a]; node >= 0)
+                    if (const Index node = shell_.dihedrals[h].nodes[a]; node >= 0)
                         out.segment<3>(3 * node) += by_angle * lane_of(by_node[a], h - first);
             }
         }

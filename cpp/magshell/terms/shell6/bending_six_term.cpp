@@ -14,28 +14,28 @@ Vec3 normal_of(const std::array<Vec3, 6>& x) {
 
 }  // namespace
 
-BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
+BendingSixTerm::BendingSixTerm(const SixNodeShell& shell, Index body, const ColoredLoop& element_blocks,
                                const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                                Registry& registry)
-    : StrainScaffold(sheet.n_faces()),
-      sheet_(sheet),
+    : StrainScaffold(shell.n_faces()),
+      shell_(shell),
       body_(body),
       nodes_(nodes),
       first_scalar_(nodes.first_scalar()),
       element_blocks_(element_blocks),
-      loop_(sheet.own_nodes, element_blocks, matrix),
-      materials_(sheet.owner, sheet.faces, registry),
-      growth_(sheet.owner, sheet.faces, growth, registry),
-      rest_(sheet.rest.begin(), sheet.rest.end()),
+      loop_(shell.own_nodes, element_blocks, matrix),
+      materials_(shell.owner, shell.faces, registry),
+      growth_(shell.owner, shell.faces, growth, registry),
+      rest_(shell.rest.begin(), shell.rest.end()),
       elements_(loop_.groups()),
       rest_measures_(loop_.groups()),
       stiffness_(loop_.groups()),
-      dihedrals_(sheet.dihedrals.size()) {
+      dihedrals_(shell.dihedrals.size()) {
     for (Index group = 0; group < loop_.groups(); ++group) {
         SimdVec3 x[6];
         for (int lane = 0; lane < SimdDouble::width; ++lane) {
             const Index f = loop_.element(group, lane);
-            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet.rest[f][k]);
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, shell.rest[f][k]);
             for (int p = 0; p < BendingSix::points; ++p)
                 elements_[group].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
             for (int r = 0; r < 9; ++r) elements_[group].scale[r].set(lane, rest_[f].scale[r]);
@@ -43,10 +43,10 @@ BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const Colo
         BendingSix(x).measures(elements_[group], rest_measures_[group].data());
     }
     if (growth_.any())
-        for (Index f = 0; f < sheet.n_faces(); ++f)
-            rest_inside_.push_back(
+        for (Index f = 0; f < shell.n_faces(); ++f)
+            reference_interior_.push_back(
                 lane_of<9>(rest_measures_[f / SimdDouble::width].data(), f % SimdDouble::width));
-    for (const SixNodeShell::Stencil& s : sheet.stencils) {
+    for (const SixNodeShell::Stencil& s : shell.stencils) {
         FaceSlots& slots = face_slots_.emplace_back();
         slots.nodes = pair_slots<15>(matrix, s.nodes);
         for (int a = 0; a < 6; ++a) {
@@ -59,7 +59,7 @@ BendingSixTerm::BendingSixTerm(const SixNodeShell& sheet, Index body, const Colo
                     r < 0 || s.rotations[b] < 0 ? -1 : matrix.rotations_slot(r, s.rotations[b]);
         }
     }
-    for (const DihedralSixStencil& fold : sheet.dihedrals) {
+    for (const DihedralSixStencil& fold : shell.dihedrals) {
         PairSlots<9>& slots = dihedral_slots_.emplace_back(pair_slots<9>(matrix, fold.nodes));
         for (int a = 6; a < 9; ++a)  // the two half-planes do not meet in d2theta
             for (int b = 3; b < 6; ++b) slots[lower_index(a - 1, b)] = -1;
@@ -70,7 +70,7 @@ DihedralAngleSix BendingSixTerm::dihedrals_at(Index first, Index last, int point
     SimdVec3 x[9] = {};
     SimdDouble right_is_face(0.0);
     for (int lane = 0; lane < SimdDouble::width; ++lane) {
-        const DihedralSixStencil& fold = sheet_.dihedrals[std::min(first + lane, last - 1)];
+        const DihedralSixStencil& fold = shell_.dihedrals[std::min(first + lane, last - 1)];
         for (int a = 0; a < 9; ++a)
             if (fold.nodes[a] >= 0) set_lane(x[a], lane, q + 3 * fold.nodes[a]);
         right_is_face.set(lane, fold.right_is_face ? 1.0 : 0.0);
@@ -79,7 +79,7 @@ DihedralAngleSix BendingSixTerm::dihedrals_at(Index first, Index last, int point
 }
 
 double BendingSixTerm::angle_change(Index fold, int point, double angle) const {
-    return std::remainder(angle - sheet_.dihedrals[fold].rest_angle[point], 2.0 * std::numbers::pi);
+    return std::remainder(angle - shell_.dihedrals[fold].rest_angle[point], 2.0 * std::numbers::pi);
 }
 
 void BendingSixTerm::store_dihedrals(const double* q) {
@@ -113,7 +113,7 @@ void BendingSixTerm::store_rates(const double* p) {
             for (DihedralState& state : dihedrals_[h]) {
                 state.rate = 0.0;
                 for (int a = 0; a < 9; ++a) {
-                    const Index node = sheet_.dihedrals[h].nodes[a];
+                    const Index node = shell_.dihedrals[h].nodes[a];
                     if (node < 0) continue;
                     for (int c = 0; c < 3; ++c) state.rate += state.gradient[3 * a + c] * p[3 * node + c];
                 }
@@ -121,16 +121,15 @@ void BendingSixTerm::store_rates(const double* p) {
     });
 }
 
-/// Adds the strains of the edges of a SIMD vector of faces, from a number changes(edge, point) and the rotations in q.
-/// It is linear, so it serves rates as well.
-template <class Turn>
-void BendingSixTerm::measure(Index group, const double* q, const Turn& turn, SimdDouble d[9]) const {
+template <class AngleOf>
+void BendingSixTerm::add_edge_strains(Index group, const double* q, const AngleOf& angle_of,
+                                      SimdDouble d[9]) const {
     const double* rotation = q + first_scalar_;
     for (int lane = 0; lane < SimdDouble::width; ++lane)
         for (int i = 0; i < 3; ++i) {
-            const FaceSideSix& side = sheet_.sides[loop_.element(group, lane)][i];
+            const FaceSideSix& side = shell_.sides[loop_.element(group, lane)][i];
             for (int g = 0; g < 2; ++g) {
-                double delta = side.dihedral < 0 ? 0.0 : side.weight * turn(side.dihedral, side.point(g));
+                double delta = side.dihedral < 0 ? 0.0 : side.weight * angle_of(side.dihedral, side.point(g));
                 if (side.rotation[g] >= 0) delta += side.sign * rotation[side.rotation[g]];
                 d[3 * i + g].set(lane, d[3 * i + g][lane] + delta);
             }
@@ -146,7 +145,7 @@ void BendingSixTerm::interior(Index group, const double* q, SimdDouble f[9]) con
 
 void BendingSixTerm::strain(Index group, const double* q, SimdDouble d[9]) const {
     interior(group, q, d);
-    measure(group, q, [&](Index fold, int g) { return dihedrals_[fold][g].angle_change; }, d);
+    add_edge_strains(group, q, [&](Index fold, int g) { return dihedrals_[fold][g].angle_change; }, d);
 }
 
 void BendingSixTerm::rate(Index group, const double* p, SimdDouble d[9]) const {
@@ -156,7 +155,7 @@ void BendingSixTerm::rate(Index group, const double* p, SimdDouble d[9]) const {
     loop_.gather(group, p, along);
     BendingSix(x).rows(elements_[group], rows);
     rows.along(along, d);
-    measure(group, p, [&](Index fold, int g) { return dihedrals_[fold][g].rate; }, d);
+    add_edge_strains(group, p, [&](Index fold, int g) { return dihedrals_[fold][g].rate; }, d);
 }
 
 std::vector<std::array<double, 2>> BendingSixTerm::angle_changes_at(const double* q) const {
@@ -176,10 +175,10 @@ std::vector<std::array<double, 2>> BendingSixTerm::angle_changes_at(const double
 
 Strains BendingSixTerm::strains_at(const double* q) const {
     const std::vector<std::array<double, 2>> changes = angle_changes_at(q);
-    Strains out(sheet_.n_faces(), 9);
+    Strains out(shell_.n_faces(), 9);
     each_group([&](Index group) {
         interior(group, q, out.at(group));
-        measure(group, q, [&](Index fold, int g) { return changes[fold][g]; }, out.at(group));
+        add_edge_strains(group, q, [&](Index fold, int g) { return changes[fold][g]; }, out.at(group));
     });
     return out;
 }
@@ -189,7 +188,7 @@ double BendingSixTerm::energy(const double* q, const LoadParameters&) const {
     return loop_.sum([&](Index group) {
         SimdDouble d[9], stress[9];
         interior(group, q, d);
-        measure(group, q, [&](Index fold, int g) { return changes[fold][g]; }, d);
+        add_edge_strains(group, q, [&](Index fold, int g) { return changes[fold][g]; }, d);
         stiffness_[group].times(d, stress);
         SimdDouble sum = d[0] * stress[0];
         for (int r = 1; r < 9; ++r) sum += d[r] * stress[r];
@@ -229,9 +228,9 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
     element_blocks_.scatter([&](const ElementBlock& element_block) {
         for (Index h = element_block.first_dihedral; h < element_block.last_dihedral; ++h)
             for (int g = 0; g < 2; ++g) {
-                const double m = moment(sheet_.dihedrals[h], g, stresses);
+                const double m = moment(shell_.dihedrals[h], g, stresses);
                 for (int a = 0; a < 9; ++a) {
-                    const Index node = sheet_.dihedrals[h].nodes[a];
+                    const Index node = shell_.dihedrals[h].nodes[a];
                     if (node < 0) continue;
                     for (int c = 0; c < 3; ++c)
                         out.add(3 * node + c, m * dihedrals_[h][g].gradient[3 * a + c]);
@@ -239,7 +238,7 @@ void BendingSixTerm::add_forces(const Strains& stresses, Residual& out) {
             }
         for (Index f = element_block.first; f < element_block.last; ++f)
             for (int i = 0; i < 3; ++i) {
-                const FaceSideSix& side = sheet_.sides[f][i];
+                const FaceSideSix& side = shell_.sides[f][i];
                 for (int g = 0; g < 2; ++g)
                     if (side.rotation[g] >= 0)
                         out.add(first_scalar_ + side.rotation[g], side.sign * stresses.number(f, 3 * i + g));
@@ -268,13 +267,13 @@ void BendingSixTerm::assemble_faces(Index group, const double* q, const Strains&
     loop_.gather(group, q, x);
     const BendingSix face(x);
     face.rows(elements_[group], rows);
-    // Dihedral angles add to the rows of their edge: for the face's own nodes, and for the three nodes across
-    // the edge.
-    SimdVec3 beyond[3][2][3] = {};
+    // J has a row for each strain 3 i + g and a block for each node. Dihedral angles add to the rows of their edge i: to the blocks of the
+    // face's own nodes, and to those of the three nodes across the edge, which are in across[i][g].
+    SimdVec3 across[3][2][3] = {};
     SimdDouble sign[3] = {};
     for (int lane = 0; lane < SimdDouble::width; ++lane)
         for (int i = 0; i < 3; ++i) {
-            const FaceSideSix& side = sheet_.sides[loop_.element(group, lane)][i];
+            const FaceSideSix& side = shell_.sides[loop_.element(group, lane)][i];
             sign[i].set(lane, side.sign);
             if (side.dihedral < 0) continue;
             const SideNodes& at = side.on_left ? left_side : right_side;
@@ -286,7 +285,7 @@ void BendingSixTerm::assemble_faces(Index group, const double* q, const Strains&
                     SimdVec3& row = rows.at[3 * i + g][own[k]];
                     set_lane(row, lane, lane_of(row, lane) + part(at.own[k]));
                 }
-                for (int k = 0; k < 3; ++k) set_lane(beyond[i][g][k], lane, part(at.beyond + k));
+                for (int k = 0; k < 3; ++k) set_lane(across[i][g][k], lane, part(at.beyond + k));
             }
         }
     const Symmetric9 stiffness = history_.scaled(stiffness_[group]);
@@ -298,33 +297,33 @@ void BendingSixTerm::assemble_faces(Index group, const double* q, const Strains&
         for (int k = 0; k < 3; ++k) {
             const int row = 6 + 3 * i + k;
             for (int a = 0; a < 6; ++a)
-                h[lower_index(row, a)] = outer(beyond[i][0][k], stiff.at[3 * i][a]) +
-                                         outer(beyond[i][1][k], stiff.at[3 * i + 1][a]);
+                h[lower_index(row, a)] = outer(across[i][0][k], stiff.at[3 * i][a]) +
+                                         outer(across[i][1][k], stiff.at[3 * i + 1][a]);
             for (int j = 0; j <= i; ++j) {
                 // The coupling of the nodes across edge i with those across edge j.
-                SimdVec3 felt[2];
+                SimdVec3 stressed[2];
                 for (int g = 0; g < 2; ++g)
-                    felt[g] = stiffness(3 * i, 3 * j + g) * beyond[i][0][k] +
-                              stiffness(3 * i + 1, 3 * j + g) * beyond[i][1][k];
+                    stressed[g] = stiffness(3 * i, 3 * j + g) * across[i][0][k] +
+                                  stiffness(3 * i + 1, 3 * j + g) * across[i][1][k];
                 for (int l = 0; l < 3; ++l)
                     if (6 + 3 * j + l <= row)
                         h[lower_index(row, 6 + 3 * j + l)] =
-                            outer(felt[0], beyond[j][0][l]) + outer(felt[1], beyond[j][1][l]);
+                            outer(stressed[0], across[j][0][l]) + outer(stressed[1], across[j][1][l]);
             }
         }
-    SimdVec3 beside[6][15];  // row of rotation 2 i + g against the nodes
+    SimdVec3 by_rotation[6][15];  // blocks of the Hessian between rotation 2 i + g and the nodes
     for (int i = 0; i < 3; ++i)
         for (int g = 0; g < 2; ++g) {
-            for (int a = 0; a < 6; ++a) beside[2 * i + g][a] = sign[i] * stiff.at[3 * i + g][a];
+            for (int a = 0; a < 6; ++a) by_rotation[2 * i + g][a] = sign[i] * stiff.at[3 * i + g][a];
             for (int j = 0; j < 3; ++j)
                 for (int l = 0; l < 3; ++l)
-                    beside[2 * i + g][6 + 3 * j + l] =
-                        sign[i] * (stiffness(3 * i + g, 3 * j) * beyond[j][0][l] +
-                                   stiffness(3 * i + g, 3 * j + 1) * beyond[j][1][l]);
+                    by_rotation[2 * i + g][6 + 3 * j + l] =
+                        sign[i] * (stiffness(3 * i + g, 3 * j) * across[j][0][l] +
+                                   stiffness(3 * i + g, 3 * j + 1) * across[j][1][l]);
         }
     for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
         const Index f = loop_.element(group, lane);
-        const SixNodeShell::Stencil& stencil = sheet_.stencils[f];
+        const SixNodeShell::Stencil& stencil = shell_.stencils[f];
         const FaceSlots& slots = face_slots_[f];
         scatter_blocks<15>(out, stencil.nodes, slots.nodes, h, lane);
         for (int a = 0; a < 6; ++a) {
@@ -332,7 +331,7 @@ void BendingSixTerm::assemble_faces(Index group, const double* q, const Strains&
             for (int k = 0; k < 15; ++k)
                 if (stencil.nodes[k] >= 0)
                     out.add_rotation_row(slots.rotation_nodes[a][k], out.column_length(stencil.nodes[k]),
-                                         beside[a][k], lane);
+                                         by_rotation[a][k], lane);
         }
         add_rotations(group, lane, sign, stiffness, out);
     }
@@ -355,34 +354,34 @@ void BendingSixTerm::assemble_dihedrals(Index first, Index last, const double* q
     for (int g = 0; g < 2; ++g) {
         SimdDouble moments(0.0);
         for (Index fold = first; fold < last; ++fold)
-            moments.set(fold - first, moment(sheet_.dihedrals[fold], g, stress));
+            moments.set(fold - first, moment(shell_.dihedrals[fold], g, stress));
         dihedrals_at(first, last, g, q).add_curvature(moments, h);
     }
     for (Index fold = first; fold < last; ++fold)
-        scatter_blocks<9>(out, sheet_.dihedrals[fold].nodes, dihedral_slots_[fold], h, fold - first);
+        scatter_blocks<9>(out, shell_.dihedrals[fold].nodes, dihedral_slots_[fold], h, fold - first);
 }
 
 // Bounds round-off as BendingTerm does: an angle is exact to one unit of round-off, or to that of the positions
 // divided by the heights of the faces.
 void BendingSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
-    for (Index f = 0; f < sheet_.n_faces(); ++f) {
-        const double height = sheet_.smallest_height(f);
-        const double angle = 1.0 + 0.25 * (sheet_.largest_coordinate(f) + beyond) / height;
+    for (Index f = 0; f < shell_.n_faces(); ++f) {
+        const double height = shell_.smallest_height(f);
+        const double angle = 1.0 + 0.25 * (shell_.largest_coordinate(f) + beyond) / height;
         for (int r = 0; r < 9; ++r) {
             double moment = 0.0;
             for (int s = 0; s < 9; ++s)
                 moment += std::abs(stiffness_[f / SimdDouble::width](r, s)[f % SimdDouble::width]) * angle;
             if (r % 3 < 2)
-                if (const Index rotation = sheet_.sides[f][r / 3].rotation[r % 3]; rotation >= 0)
+                if (const Index rotation = shell_.sides[f][r / 3].rotation[r % 3]; rotation >= 0)
                     out[first_scalar_ + rotation] += moment;
-            for (const Index node : sheet_.own_nodes[f]) out.segment<3>(3 * node).array() += moment / height;
+            for (const Index node : shell_.own_nodes[f]) out.segment<3>(3 * node).array() += moment / height;
         }
     }
 }
 
 std::size_t BendingSixTerm::bytes() const {
     return bytes_of(face_slots_) + bytes_of(dihedral_slots_) + materials_.bytes() + growth_.bytes() +
-           bytes_of(rest_) + bytes_of(rest_inside_) + bytes_of(elements_) + bytes_of(rest_measures_) +
+           bytes_of(rest_) + bytes_of(reference_interior_) + bytes_of(elements_) + bytes_of(rest_measures_) +
            bytes_of(stiffness_) + bytes_of_stresses() + bytes_of(dihedrals_) + bytes_of(state_) +
            loop_.bytes();
 }
@@ -390,7 +389,7 @@ std::size_t BendingSixTerm::bytes() const {
 bool BendingSixTerm::set_values(const Values& values) {
     const bool material_changed = materials_.set_values(values), grew = growth_.set_values(values);
     if (!material_changed && !grew) return false;
-    if (grew) grow();
+    if (grew) set_natural_measures();
     for (Index group = 0; group < loop_.groups(); ++group)
         for (int lane = 0; lane < SimdDouble::width; ++lane) {
             const Index f = loop_.element(group, lane);
@@ -402,16 +401,16 @@ bool BendingSixTerm::set_values(const Values& values) {
 Vec9 BendingSixTerm::rest_angles(Index face) const {
     Vec9 angles = Vec9::Zero();
     for (int i = 0; i < 3; ++i) {
-        const FaceSideSix& side = sheet_.sides[face][i];
+        const FaceSideSix& side = shell_.sides[face][i];
         for (int g = 0; g < 2 && side.dihedral >= 0; ++g)
-            angles[3 * i + g] = side.weight * sheet_.dihedrals[side.dihedral].rest_angle[side.point(g)];
+            angles[3 * i + g] = side.weight * shell_.dihedrals[side.dihedral].rest_angle[side.point(g)];
     }
     return angles;
 }
 
 // Dihedral angles are measured from their reference values already, so `angles` is subtracted from the natural
 // measures.
-void BendingSixTerm::grow() {
+void BendingSixTerm::set_natural_measures() {
     for (Index group = 0; group < loop_.groups(); ++group)
         for (int lane = 0; lane < SimdDouble::width; ++lane) {
             const Index f = loop_.element(group, lane);
@@ -420,7 +419,8 @@ void BendingSixTerm::grow() {
             for (int p = 0; p < BendingSix::points; ++p)
                 elements_[group].inverse_jacobian[p].set(lane, rest_[f].inverse_jacobian[p]);
             const Vec9 angles = rest_angles(f);
-            const Vec9 natural = face.rest().cwiseProduct(rest_inside_[f] + angles) + face.bent() - angles;
+            const Vec9 natural = face.reference_factors().cwiseProduct(reference_interior_[f] + angles) +
+                                 face.curvature_measures() - angles;
             for (int r = 0; r < 9; ++r) {
                 elements_[group].scale[r].set(lane, rest_[f].scale[r]);
                 rest_measures_[group][r].set(lane, natural[r]);
@@ -431,14 +431,15 @@ void BendingSixTerm::grow() {
 // Returns the gradient of by . d by growth for a fixed shape whose interior measures are `inside`.
 GrownFace::ByNatural BendingSixTerm::strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
                                                        const Vec9& interior) const {
-    GrownFace::ByNatural found = face.natural_by_growth(-by, rest_inside_[number] + rest_angles(number));
-    found.growth += face.inside_by_growth(by, interior);
+    GrownFace::ByNatural found =
+        face.natural_by_growth(-by, reference_interior_[number] + rest_angles(number));
+    found.growth += face.interior_by_growth(by, interior);
     return found;
 }
 
 void BendingSixTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     store_rates(lambda);
-    std::vector<Eigen::Vector2d> of_faces(sheet_.n_faces());
+    std::vector<Eigen::Vector2d> of_faces(shell_.n_faces());
     each_group([&](Index group) {
         SimdDouble d[9], along[9];
         strain(group, q, d);
@@ -451,13 +452,13 @@ void BendingSixTerm::vjp(const double* q, const LoadParameters&, const double* l
                            rates.dot(rest_[f].bending_by_poisson_ratio(materials_[f]) * lane_of<9>(d, lane))};
         }
     });
-    for (Index f = 0; f < sheet_.n_faces(); ++f)
+    for (Index f = 0; f < shell_.n_faces(); ++f)
         materials_.add_vjp(f, 3, of_faces[f][0], of_faces[f][1], out);
     if (growth_.any()) add_growth_vjp(q, lambda, out);
 }
 
 void BendingSixTerm::add_growth_vjp(const double* q, const double* lambda, Gradient& out) const {
-    std::vector<GrownFace::ByNatural> by_faces(sheet_.n_faces());
+    std::vector<GrownFace::ByNatural> by_faces(shell_.n_faces());
     each_group([&](Index group) {
         SimdVec3 x[6], p[6];
         SimdDouble now[9], along_inside[9], d[9], along[9], stresses[9];
@@ -480,10 +481,10 @@ void BendingSixTerm::add_growth_vjp(const double* q, const double* lambda, Gradi
                                    lane_of<9>(now, lane));
             by.growth +=
                 face.bending_by_growth(materials_[f], lane_of<9>(along, lane), lane_of<9>(d, lane)) +
-                face.inside_by_growth(lane_of<9>(stress_.at(group), lane), lane_of<9>(along_inside, lane));
+                face.interior_by_growth(lane_of<9>(stress_.at(group), lane), lane_of<9>(along_inside, lane));
         }
     });
-    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+    for (Index f = 0; f < shell_.n_faces(); ++f) {
         const GrownSix face = grown(f);
         growth_.add_vjp(f, face.in_world(by_faces[f].growth), face.in_world(by_faces[f].curvature), out);
     }
@@ -510,7 +511,7 @@ void BendingSixTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
 std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest() const {
     VectorXd q(3 * nodes_.n_nodes());
     for (Index node = 0; node < nodes_.n_nodes(); ++node) q.segment<3>(3 * node) = nodes_.rest[node];
-    const Index n = sheet_.n_dihedrals();
+    const Index n = shell_.n_dihedrals();
     std::vector<std::array<std::array<double, 9>, 2>> slopes(n);
     for (Index first = 0; first < n; first += SimdDouble::width) {
         const Index last = std::min<Index>(first + SimdDouble::width, n);
@@ -520,8 +521,8 @@ std::vector<std::array<std::array<double, 9>, 2>> BendingSixTerm::slopes_at_rest
             for (Index h = first; h < last; ++h) {
                 Vec3 normal = Vec3::Zero();
                 for (const DihedralStencil::Side& side :
-                     {sheet_.dihedrals[h].left, sheet_.dihedrals[h].right})
-                    if (side.face >= 0) normal += normal_of(sheet_.rest[side.face]);
+                     {shell_.dihedrals[h].left, shell_.dihedrals[h].right})
+                    if (side.face >= 0) normal += normal_of(shell_.rest[side.face]);
                 normal.normalize();
                 for (int a = 0; a < 9; ++a) slopes[h][g][a] = lane_of(by_node[a], h - first).dot(normal);
             }
@@ -535,25 +536,25 @@ bool BendingSixTerm::add_projective_stiffness(NodeMatrix& out) const {
     for (Index group = 0; group < loop_.groups(); ++group) {
         SimdVec3 x[6];
         for (int lane = 0; lane < SimdDouble::width; ++lane)
-            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet_.rest[loop_.element(group, lane)][k]);
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, shell_.rest[loop_.element(group, lane)][k]);
         SixNodeRows interior;
         BendingSix(x).rows(elements_[group], interior);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
             const Index f = loop_.element(group, lane);
-            const Vec3 normal = normal_of(sheet_.rest[f]);
+            const Vec3 normal = normal_of(shell_.rest[f]);
             NodeRows rows(9);
             for (int r = 0; r < 9; ++r)
                 for (int k = 0; k < 6; ++k)
-                    rows.add(r, sheet_.own_nodes[f][k], lane_of(interior.at[r][k], lane).dot(normal));
+                    rows.add(r, shell_.own_nodes[f][k], lane_of(interior.at[r][k], lane).dot(normal));
             for (int i = 0; i < 3; ++i) {
-                const FaceSideSix& side = sheet_.sides[f][i];
+                const FaceSideSix& side = shell_.sides[f][i];
                 for (int g = 0; g < 2; ++g) {
                     for (int a = 0; a < 9 && side.dihedral >= 0; ++a)
-                        if (const Index node = sheet_.dihedrals[side.dihedral].nodes[a]; node >= 0)
+                        if (const Index node = shell_.dihedrals[side.dihedral].nodes[a]; node >= 0)
                             rows.add(3 * i + g, node, side.weight * slopes[side.dihedral][side.point(g)][a]);
                     if (side.rotation[g] < 0) continue;
                     rows.add(3 * i + g, out.point(side.rotation[g]), side.sign);
-                    const std::array<Index, 6>& own = sheet_.own_nodes[f];
+                    const std::array<Index, 6>& own = shell_.own_nodes[f];
                     out.add_adjacent_face(side.rotation[g], {own[0], own[1], own[2]});
                 }
             }

@@ -22,7 +22,7 @@ namespace magshell {
 
 class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public RestShapeTerm {
   public:
-    BendingSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
+    BendingSixTerm(const SixNodeShell& shell, Index body, const ColoredLoop& element_blocks,
                    const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                    Registry& registry);
 
@@ -55,7 +55,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
     bool grows() const { return growth_.any(); }
     /// Returns the natural (stress-free) configuration of a face, from which strains are measured.
     GrownSix grown(Index face) const {
-        return {sheet_.rest[face], growth_.growth(face), growth_.curvature(face)};
+        return {shell_.rest[face], growth_.growth(face), growth_.curvature(face)};
     }
 
   private:
@@ -85,21 +85,28 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
     }
     /// Returns theta - theta~ [rad] at both points of every dihedral stencil.
     std::vector<std::array<double, 2>> angle_changes_at(const double* q) const;
+    /// Returns the angles at one point of dihedral stencils first to last - 1, in one SIMD vector.
     DihedralAngleSix dihedrals_at(Index first, Index last, int point, const double* q) const;
+    /// Returns theta - theta~ [rad], from -pi to pi.
     double angle_change(Index fold, int point, double angle) const;
-    template <class Turn>
-    void measure(Index group, const double* q, const Turn& turn, SimdDouble d[9]) const;
+    /// Adds the strains of the edges of a SIMD vector of faces: from angle_of(stencil, point) and the rotations in q. Linear in both, so it
+    /// computes rates as well.
+    template <class AngleOf>
+    void add_edge_strains(Index group, const double* q, const AngleOf& angle_of, SimdDouble d[9]) const;
+    /// Computes the curvature measures inside the faces of a SIMD vector, relative to their natural values.
     void interior(Index group, const double* q, SimdDouble f[9]) const;
+    /// Returns the weighted dihedral angles of the edges of a face in the reference shape, as they enter its strains.
     Vec9 rest_angles(Index face) const;
-    void grow();
+    /// Sets the natural configuration of all faces, from which strains are measured, after growth or curvature have changed.
+    void set_natural_measures();
     void add_growth_vjp(const double* q, const double* lambda, Gradient& out) const;
-    // Gradients by what a face takes from its rest shape (rest_), and by the nodes of the rest shape itself.
+    // Gradients with respect to the numbers that a face takes from its rest shape (SixNodeFace), and to the nodes of that shape.
     struct ByRestFace {
         std::array<double, 6> inverse_jacobian{};
         Vec9 scale = Vec9::Zero();
         std::array<Vec3, 6> nodes;
     };
-    // Computes that of by . d for the part d inside of a vector of faces, with the interior at q and at rest.
+    // Computes the gradient of by . d, with d the measures inside the faces of a SIMD vector. now: the shape of these faces at q.
     void strains_by_rest(Index group, const BendingSix& now, const SimdDouble by[9],
                          ByRestFace out[SimdDouble::width]) const;
     void add_rest_face(Index face, const ByRestFace& by, VectorXd& out) const;
@@ -108,6 +115,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
                                    double weight, const Vec9& of_r, const Vec9& of_d) const;
     GrownFace::ByNatural strains_by_growth(const GrownSix& face, Index number, const Vec9& by,
                                            const Vec9& interior) const;
+    // For StrainScaffold:
     void begin_strains(const double* q) { store_dihedrals(q); }
     void begin_rates(const double* p) { store_rates(p); }
     void strain(Index group, const double* q, SimdDouble d[9]) const;
@@ -119,10 +127,13 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
     void store_dihedrals(const double* q);
     void store_rates(const double* p);
     double moment(const DihedralSixStencil& fold, int point, const Strains& stress) const;
+    // The Hessian of the faces of a SIMD vector, without the second derivatives of dihedral angles; of dihedral stencils first to last - 1,
+    // those second derivatives; and of faces at rest, with rotations measured from the reference orientation.
     void assemble_faces(Index group, const double* q, const Strains& stress, SystemMatrix& out) const;
     void assemble_from_rest(Index group, const double* q, SystemMatrix& out) const;
-    void add_held(Index group, const SimdVec3 (&held)[3][2], const SimdDouble sign[3],
-                  const Symmetric9& stiffness, const SixNodeRows& stiff, SystemMatrix& out) const;
+    // Adds the blocks with the directors of clamped edges, and those between the rotations of a face.
+    void add_directors(Index group, const SimdVec3 (&directors)[3][2], const SimdDouble sign[3],
+                       const Symmetric9& stiffness, const SixNodeRows& stiff, SystemMatrix& out) const;
     void add_rotations(Index group, int lane, const SimdDouble sign[3], const Symmetric9& stiffness,
                        SystemMatrix& out) const;
     template <class Visit>
@@ -130,7 +141,7 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
     void assemble_dihedrals(Index first, Index last, const double* q, const Strains& stress,
                             SystemMatrix& out) const;
 
-    const SixNodeShell& sheet_;
+    const SixNodeShell& shell_;
     const Index body_;
     const Nodes& nodes_;
     const Index first_scalar_;
@@ -138,16 +149,17 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
     ElementLoop<6> loop_;
     ShellMaterials materials_;
     ShellGrowth growth_;
-    std::vector<SixNodeFace> rest_;
+    std::vector<SixNodeFace> rest_;  // the natural configuration, by face
     std::vector<BendingSix::Element> elements_;
-    std::vector<std::array<SimdDouble, 9>> rest_measures_;
-    std::vector<Vec9> rest_inside_;  // curvature measures of the reference shape, where anything grows
+    std::vector<std::array<SimdDouble, 9>>
+        rest_measures_;                     // natural values of the curvature measures, by SIMD vector
+    std::vector<Vec9> reference_interior_;  // curvature measures of the reference shape, where anything grows
     std::vector<FaceSlots> face_slots_;
     std::vector<PairSlots<9>> dihedral_slots_;
     std::vector<Symmetric9> stiffness_;
     std::vector<DihedralStates> dihedrals_;
     std::vector<double> state_;  // the positions of the last evaluated state
-    bool from_rest_ = false;
+    bool from_rest_ = false;     // whether rotations are measured from the reference orientation
     // for each edge, while rotations are measured from the reference orientation
     std::vector<SideRotations> side_rotations_;
 };

@@ -20,7 +20,7 @@ namespace {
 template <class Law>
 class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies, public RestShapeTerm {
   public:
-    MagneticSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
+    MagneticSixTerm(const SixNodeShell& shell, Index body, const ColoredLoop& element_blocks,
                     const SystemMatrix& matrix, const FieldSources& sources, Registry& registry);
 
     std::string_view name() const override { return Magnetic::name; }
@@ -32,7 +32,7 @@ class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies, p
     }
     std::vector<double> element_energies(const double* q,
                                          const LoadParameters& load_parameters) const override {
-        return of_elements(loop_, sheet_.faces.user, energy_of_group(q, load_parameters));
+        return of_elements(loop_, shell_.faces.user, energy_of_group(q, load_parameters));
     }
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
     void prepare_assembly(const double* q, const LoadParameters& load_parameters) override;
@@ -75,14 +75,14 @@ class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies, p
         };
     }
 
-    const SixNodeShell& sheet_;
+    const SixNodeShell& shell_;
     const Index body_;
     const ElementLoop<6> loop_;
     const TotalAppliedField field_;
     ParameterSlice magnetization_, thickness_;  // values
     std::vector<double> thicknesses_;
     std::vector<Points> elements_;
-    // The gradient by the magnetization of each point, and the applied field there, from the last vjp().
+    // The gradient with respect to the magnetization of each point, and the applied field there, from the last vjp().
     std::vector<Vec3> by_magnetization_;
     std::vector<FluxAndRate> applied_;
     std::vector<Fields> fields_;  // sampled for the current assembly; empty in a uniform field
@@ -90,16 +90,16 @@ class MagneticSixTerm final : public AppliedFieldTerm, public ElementEnergies, p
 };
 
 template <class Law>
-MagneticSixTerm<Law>::MagneticSixTerm(const SixNodeShell& sheet, Index body,
+MagneticSixTerm<Law>::MagneticSixTerm(const SixNodeShell& shell, Index body,
                                       const ColoredLoop& element_blocks, const SystemMatrix& matrix,
                                       const FieldSources& sources, Registry& registry)
-    : sheet_(sheet),
+    : shell_(shell),
       body_(body),
-      loop_(sheet.own_nodes, element_blocks, matrix),
+      loop_(shell.own_nodes, element_blocks, matrix),
       field_(sources, registry),
-      magnetization_(registry.values.add(sheet.owner, "remanent_magnetization", "A/m", sheet.n_faces(), 3,
-                                         &sheet.faces)),
-      thickness_(registry.values.add(sheet.owner, "thickness", "m", sheet.n_faces(), 1, &sheet.faces)),
+      magnetization_(registry.values.add(shell.owner, "remanent_magnetization", "A/m", shell.n_faces(), 3,
+                                         &shell.faces)),
+      thickness_(registry.values.add(shell.owner, "thickness", "m", shell.n_faces(), 1, &shell.faces)),
       elements_(loop_.groups()) {}
 
 template <class Law>
@@ -108,8 +108,8 @@ std::array<Vec3, 2> MagneticSixTerm<Law>::rest_edges(Index face, int point) cons
     const std::array<double, 6> first = six_nodes::derivative(2, at), second = six_nodes::derivative(1, at);
     Vec3 a1 = Vec3::Zero(), a2 = Vec3::Zero();
     for (int k = 0; k < 6; ++k) {
-        a1 += first[k] * sheet_.rest[face][k];
-        a2 -= second[k] * sheet_.rest[face][k];
+        a1 += first[k] * shell_.rest[face][k];
+        a2 -= second[k] * shell_.rest[face][k];
     }
     return {a1, a2};
 }
@@ -145,7 +145,7 @@ bool MagneticSixTerm<Law>::set_values(const Values& values) {
 template <class Law>
 void MagneticSixTerm<Law>::find_points(const double* q, std::vector<Vec3>& places,
                                        std::vector<Vec3>& magnetizations) const {
-    places.resize(static_cast<std::size_t>(sheet_.n_faces()) * points);
+    places.resize(static_cast<std::size_t>(shell_.n_faces()) * points);
     magnetizations.resize(places.size());
     loop_.each_group([&](Index group) {
         SimdVec3 x[6];
@@ -300,7 +300,7 @@ void MagneticSixTerm<Law>::add_rest_vjp(const double* q, const LoadParameters&, 
             at.frame().frame(columns);
             for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
                 const Index f = loop_.element(group, lane), n = f * points + p;
-                const RestPointSix rest(sheet_.rest[f], six_nodes::inside[p].at);
+                const RestPointSix rest(shell_.rest[f], six_nodes::inside[p].at);
                 const RestShape shape(rest.corners());
                 const Vec3 coordinates(e.alpha[lane], e.beta[lane], e.gamma[lane]);
                 std::array<Vec3, 2> by_edges;
@@ -316,7 +316,7 @@ void MagneticSixTerm<Law>::add_rest_vjp(const double* q, const LoadParameters&, 
                     by_edges = rotating_by_rest_edges(shape, face, at_rest * coordinates, e.volume[lane],
                                                       applied_[n]);
                 }
-                rest.add_by_edges(by_edges, sheet_.own_nodes[f], out);
+                rest.add_by_edges(by_edges, shell_.own_nodes[f], out);
             }
         }
     }
@@ -329,13 +329,13 @@ std::size_t MagneticSixTerm<Law>::bytes() const {
 
 }  // namespace
 
-std::unique_ptr<Term> make_magnetic_six_term(MagnetizationLaw law, const SixNodeShell& sheet, Index body,
+std::unique_ptr<Term> make_magnetic_six_term(MagnetizationLaw law, const SixNodeShell& shell, Index body,
                                              const ColoredLoop& element_blocks, const SystemMatrix& matrix,
                                              const FieldSources& sources, Registry& registry) {
     if (law == MagnetizationLaw::rotates)
-        return std::make_unique<MagneticSixTerm<RotatingMagnetic>>(sheet, body, element_blocks, matrix,
+        return std::make_unique<MagneticSixTerm<RotatingMagnetic>>(shell, body, element_blocks, matrix,
                                                                    sources, registry);
-    return std::make_unique<MagneticSixTerm<Magnetic>>(sheet, body, element_blocks, matrix, sources,
+    return std::make_unique<MagneticSixTerm<Magnetic>>(shell, body, element_blocks, matrix, sources,
                                                        registry);
 }
 

@@ -13,7 +13,7 @@
 namespace magshell {
 
 /// Creates the term and registers "remanent_magnetization" [A/m] and "thickness" [m] of every face. The sources must outlive it.
-std::unique_ptr<Term> make_magnetic_six_term(MagnetizationLaw law, const SixNodeShell& sheet, Index body,
+std::unique_ptr<Term> make_magnetic_six_term(MagnetizationLaw law, const SixNodeShell& shell, Index body,
                                              const ColoredLoop& element_blocks, const SystemMatrix& matrix,
                                              const FieldSources& sources, Registry& registry);
 

@@ -6,8 +6,8 @@ namespace magshell {
 
 void MembraneSixTerm::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda,
                                    VectorXd& out) {
-    Strains by_measures(sheet_.n_faces(), 9);
-    std::vector<Vec9> strains(sheet_.n_faces()), rates(sheet_.n_faces());
+    Strains by_measures(shell_.n_faces(), 9);
+    std::vector<Vec9> strains(shell_.n_faces()), rates(shell_.n_faces());
     each_group([&](Index group) {
         SimdDouble d[9], along[9], stresses[9];
         strain(group, q, d);
@@ -20,20 +20,20 @@ void MembraneSixTerm::add_rest_vjp(const double* q, const LoadParameters&, const
             rates[loop_.element(group, lane)] = lane_of<9>(along, lane);
         }
     });
-    for (Index f = 0; f < sheet_.n_faces(); ++f)
+    for (Index f = 0; f < shell_.n_faces(); ++f)
         for (const six_nodes::Point& point : six_nodes::inside) {
-            const RestPointSix rest(sheet_.rest[f], point.at);
+            const RestPointSix rest(shell_.rest[f], point.at);
             const GrownFace face(rest.corners(), Mat3::Identity(), Mat3::Zero());
             const Eigen::Matrix<double, 3, 9> rows = membrane_interpolation(point.at);
             const Mat2 by =
                 face.triangle().membrane_by_growth(materials_[f], rows * rates[f], rows * strains[f]);
-            rest.add_by_deformation(point.weight * face.in_world(by), sheet_.own_nodes[f], out);
+            rest.add_by_deformation(point.weight * face.in_world(by), shell_.own_nodes[f], out);
         }
     add_rest_measures_vjp(by_measures, out);
 }
 
 void MembraneSixTerm::add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const {
-    Strains by_measures(sheet_.n_faces(), 9);
+    Strains by_measures(shell_.n_faces(), 9);
     for (std::size_t k = 0; k < stresses.groups.size(); ++k) by_measures.groups[k] = -stresses.groups[k];
     add_rest_measures_vjp(by_measures, out);
 }
@@ -43,12 +43,12 @@ void MembraneSixTerm::add_rest_measures_vjp(const Strains& by_measures, VectorXd
         SimdVec3 x[6], by_node[6];
         SixNodeRows rows;
         for (int lane = 0; lane < SimdDouble::width; ++lane)
-            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet_.rest[loop_.element(group, lane)][k]);
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, shell_.rest[loop_.element(group, lane)][k]);
         MembraneSix(x).rows(rows);
         rows.forces(by_measures.at(group), by_node);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
             for (int k = 0; k < 6; ++k)
-                out.segment<3>(3 * sheet_.own_nodes[loop_.element(group, lane)][k]) +=
+                out.segment<3>(3 * shell_.own_nodes[loop_.element(group, lane)][k]) +=
                     lane_of(by_node[k], lane);
     }
 }

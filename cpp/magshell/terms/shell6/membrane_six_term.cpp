@@ -7,23 +7,23 @@
 
 namespace magshell {
 
-MembraneSixTerm::MembraneSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
+MembraneSixTerm::MembraneSixTerm(const SixNodeShell& shell, Index body, const ColoredLoop& element_blocks,
                                  const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                                  Registry& registry)
-    : StrainScaffold(sheet.n_faces()),
-      sheet_(sheet),
+    : StrainScaffold(shell.n_faces()),
+      shell_(shell),
       body_(body),
       nodes_(nodes.n_nodes()),
-      loop_(sheet.own_nodes, element_blocks, matrix),
-      materials_(sheet.owner, sheet.faces, registry),
-      growth_(sheet.owner, sheet.faces, growth, registry),
-      rest_(sheet.rest.begin(), sheet.rest.end()),
+      loop_(shell.own_nodes, element_blocks, matrix),
+      materials_(shell.owner, shell.faces, registry),
+      growth_(shell.owner, shell.faces, growth, registry),
+      rest_(shell.rest.begin(), shell.rest.end()),
       rest_measures_(loop_.groups()),
       stiffness_(loop_.groups()) {
     for (Index group = 0; group < loop_.groups(); ++group) {
         SimdVec3 x[6];
         for (int lane = 0; lane < SimdDouble::width; ++lane)
-            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, sheet.rest[loop_.element(group, lane)][k]);
+            for (int k = 0; k < 6; ++k) set_lane(x[k], lane, shell.rest[loop_.element(group, lane)][k]);
         MembraneSix(x).measures(rest_measures_[group].data());
     }
 }
@@ -41,7 +41,7 @@ bool MembraneSixTerm::set_values(const Values& values) {
 }
 
 GrownSix MembraneSixTerm::grown(Index face) const {
-    return {sheet_.rest[face], growth_.growth(face), Mat3::Zero()};
+    return {shell_.rest[face], growth_.growth(face), Mat3::Zero()};
 }
 
 void MembraneSixTerm::grow() {
@@ -92,7 +92,7 @@ void MembraneSixTerm::assemble(const ElementBlock& element_block, const double* 
 }
 
 Strains MembraneSixTerm::strains_at(const double* q) const {
-    Strains out(sheet_.n_faces(), 9);
+    Strains out(shell_.n_faces(), 9);
     loop_.each_group([&](Index group) { strain(group, q, out.at(group)); });
     return out;
 }
@@ -114,7 +114,7 @@ void MembraneSixTerm::rate(Index group, const double* p, SimdDouble d[9]) const 
 }
 
 void MembraneSixTerm::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
-    std::vector<Eigen::Vector2d> of_faces(sheet_.n_faces());
+    std::vector<Eigen::Vector2d> of_faces(shell_.n_faces());
     loop_.each_group([&](Index group) {
         SimdDouble d[9], along[9];
         strain(group, q, d);
@@ -128,10 +128,10 @@ void MembraneSixTerm::vjp(const double* q, const LoadParameters&, const double* 
                     .dot(rest_[f].membrane_by_poisson_ratio(materials_[f]) * lane_of<9>(d, lane))};
         }
     });
-    for (Index f = 0; f < sheet_.n_faces(); ++f)
+    for (Index f = 0; f < shell_.n_faces(); ++f)
         materials_.add_vjp(f, 1, of_faces[f][0], of_faces[f][1], out);
     if (!growth_.any()) return;
-    std::vector<Mat3> by_growth(sheet_.n_faces());
+    std::vector<Mat3> by_growth(shell_.n_faces());
     each_group([&](Index group) {
         SimdDouble d[9], along[9], stresses[9];
         strain(group, q, d);
@@ -146,12 +146,12 @@ void MembraneSixTerm::vjp(const double* q, const LoadParameters&, const double* 
                 history_.factor() * face.lengths_by_growth(lane_of<9>(stresses, lane)));
         }
     });
-    for (Index f = 0; f < sheet_.n_faces(); ++f) growth_.add_vjp(f, by_growth[f], Mat3::Zero(), out);
+    for (Index f = 0; f < shell_.n_faces(); ++f) growth_.add_vjp(f, by_growth[f], Mat3::Zero(), out);
 }
 
 void MembraneSixTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
     if (!growth_.any()) return;
-    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+    for (Index f = 0; f < shell_.n_faces(); ++f) {
         const GrownSix face = grown(f);
         Vec9 by;
         for (int r = 0; r < 9; ++r) by[r] = -stresses.number(f, r);
@@ -173,10 +173,10 @@ void MembraneSixTerm::add_forces(const Strains& stresses, Residual& out) {
 // Bounds round-off as MembraneTerm does: squared derivatives carry their own round-off, and that of the
 // positions.
 void MembraneSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const {
-    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+    for (Index f = 0; f < shell_.n_faces(); ++f) {
         const Index group = f / SimdDouble::width;
         const int lane = f % SimdDouble::width;
-        const double coordinate = sheet_.largest_coordinate(f) + beyond;
+        const double coordinate = shell_.largest_coordinate(f) + beyond;
         for (int r = 0; r < 9; ++r) {
             double stress = 0.0;
             for (int s = 0; s < 9; ++s) {
@@ -185,7 +185,7 @@ void MembraneSixTerm::add_cancelling_forces(double beyond, VectorXd& out) const 
                           (squared + 0.25 * std::sqrt(squared) * coordinate);
             }
             const double force = 2.0 * stress * std::sqrt(rest_measures_[group][r][lane]);
-            for (const Index node : sheet_.own_nodes[f]) out.segment<3>(3 * node).array() += force;
+            for (const Index node : shell_.own_nodes[f]) out.segment<3>(3 * node).array() += force;
         }
     }
 }
@@ -199,16 +199,16 @@ std::size_t MembraneSixTerm::bytes() const {
 // nu^2).
 bool MembraneSixTerm::add_projective_stiffness(NodeMatrix& out) const {
     constexpr auto first = six_nodes::inside_towards(2, 1.0), second = six_nodes::inside_towards(1, -1.0);
-    for (Index f = 0; f < sheet_.n_faces(); ++f) {
+    for (Index f = 0; f < shell_.n_faces(); ++f) {
         const ShellMaterial& m = materials_[f];
         const double modulus = m.thickness * m.young_modulus / (1.0 - m.poisson_ratio * m.poisson_ratio);
-        const std::array<Index, 6>& nodes = sheet_.own_nodes[f];
+        const std::array<Index, 6>& nodes = shell_.own_nodes[f];
         for (std::size_t p = 0; p < six_nodes::inside.size(); ++p) {
             Eigen::Matrix<double, 3, 2> tangents = Eigen::Matrix<double, 3, 2>::Zero();
             Eigen::Matrix<double, 2, 6> by_place;
             for (int k = 0; k < 6; ++k) {
                 by_place.col(k) << first[p][k], second[p][k];
-                tangents += sheet_.rest[f][k] * by_place.col(k).transpose();
+                tangents += shell_.rest[f][k] * by_place.col(k).transpose();
             }
             const Eigen::Matrix2d metric = tangents.transpose() * tangents;
             const double factor =

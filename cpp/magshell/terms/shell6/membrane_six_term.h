@@ -15,7 +15,7 @@ namespace magshell {
 
 class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9>, public RestShapeTerm {
   public:
-    MembraneSixTerm(const SixNodeShell& sheet, Index body, const ColoredLoop& element_blocks,
+    MembraneSixTerm(const SixNodeShell& shell, Index body, const ColoredLoop& element_blocks,
                     const Nodes& nodes, const GrowthForm& growth, const SystemMatrix& matrix,
                     Registry& registry);
 
@@ -50,7 +50,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9>, public 
     }
     GrownSix grown(Index face) const;
     void grow();
-    // Adds the gradient by rest positions from that by the measures at rest.
+    // Adds the gradient with respect to rest positions from that with respect to the measures at rest.
     void add_rest_measures_vjp(const Strains& by_measures, VectorXd& out) const;
     void begin_strains(const double*) {}
     void begin_rates(const double*) {}
@@ -58,7 +58,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9>, public 
     void rate(Index group, const double* p, SimdDouble d[9]) const;
     const Symmetric9& stiffness(Index group) const { return stiffness_[group]; }
 
-    const SixNodeShell& sheet_;
+    const SixNodeShell& shell_;
     const Index body_, nodes_;
     ElementLoop<6> loop_;
     ShellMaterials materials_;

@@ -4,7 +4,7 @@
 //
 //   dF = - F H,   dL = - L H,   dV = V tr H          L the rate of F along lambda
 //
-// so that the power V P : L of the stresses has the derivative by H
+// so that the power V P : L of the stresses has the derivative with respect to H
 //
 //   B = V ((P : L) I - F^T (dP/dF : L) - L^T P)      dW/dX_k = sum over points  B g_k
 //

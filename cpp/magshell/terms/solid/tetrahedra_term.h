@@ -260,8 +260,8 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
 
     // Returns B of the viscous part of lambda . g at a point (tetrahedra_rest.h).
     SimdMat3 viscous_by_rest(Index group, int p, const SimdMat3& f, const SimdMat3& along) const;
-    // Adds the gradient by rest positions of a function with the derivative B = of_points(group, B) by a deformation I + H of the rest
-    // shape at each point.
+    // Adds the gradient with respect to rest positions of a function with the derivative B = of_points(group, B) by a deformation I + H of
+    // the rest shape at each point.
     template <class OfPoints>
     void add_rest(VectorXd& out, const OfPoints& of_points) const;
 

@@ -59,14 +59,16 @@ def curvature(
     nothing = np.zeros(model.size)
     with inputs.in_core():
         Residual(
-            inputs, found.state, found.turns, inputs.load_parameters
+            inputs, found.state, found.angle_branches, inputs.load_parameters
         ).hessian()  # refuses one that is not symmetric
         multiplier = _core.push_forward(model, found, weights, nothing)
 
     def at(step: float, multiplier: np.ndarray, weights: np.ndarray) -> list[np.ndarray]:
         there = moved_inputs(inputs, [step * each for each in along])
         with there.in_core():
-            residual = Residual(there, found.state + step * motion, found.turns, there.load_parameters)
+            residual = Residual(
+                there, found.state + step * motion, found.angle_branches, there.load_parameters
+            )
             derivatives = residual.derivatives(multiplier)
             through = residual.prescribed(derivatives.by_state + weights)
         gradient = Gradient(

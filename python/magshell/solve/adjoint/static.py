@@ -50,7 +50,7 @@ class Adjoint:
         """
         self._refuse()
         inputs, found, model = self._inputs, self._found, self._inputs.scene._model
-        n_driven = len(model.driving(found.state, found.load_parameters, found.turns))
+        n_driven = len(model.driving(found.state, found.load_parameters, found.angle_branches))
         if not any(np.any(each) for each in along):
             change = np.zeros(model.size)
         else:

@@ -42,7 +42,7 @@ def state_tangent(inputs: Inputs, found: _core.StaticsResult, along: list[np.nda
     with inputs.in_core():
         try:
             model.term_energies(
-                found.state, found.turns, inputs.load_parameters
+                found.state, found.angle_branches, inputs.load_parameters
             )  # sets the branches of angles
             for leaf, change in zip(inputs.leaves, along, strict=True):
                 if np.any(change):
@@ -60,8 +60,8 @@ def motor_tangent(
     inputs: Inputs, found: _core.StaticsResult, along: list[np.ndarray], change: np.ndarray
 ) -> np.ndarray:
     """Return the derivative of the forces of motors along changes of all leaves, with which all dofs change so."""
-    model, state, turns = inputs.scene._model, found.state, found.turns
-    total = np.zeros(len(model.driving(state, found.load_parameters, turns)))
+    model, state, angle_branches = inputs.scene._model, found.state, found.angle_branches
+    total = np.zeros(len(model.driving(state, found.load_parameters, angle_branches)))
     size = float(np.abs(change).max(initial=0.0))
     with inputs.in_core():
         try:
@@ -69,7 +69,9 @@ def motor_tangent(
                 steps = [_STEP * inputs.scene._bodies.extent * factor / size for factor in _SHORTER]
                 total += _required(
                     directional_derivative(
-                        lambda t: model.driving(state + t * change, inputs.load_parameters, turns)[None],
+                        lambda t: model.driving(state + t * change, inputs.load_parameters, angle_branches)[
+                            None
+                        ],
                         steps,
                     )
                 )[0]
@@ -80,7 +82,7 @@ def motor_tangent(
                 def at(step: float, leaf=leaf, each=each) -> np.ndarray:
                     numbers, load_parameters = changed(inputs, leaf, step * each)
                     model.set_values(numbers)
-                    return model.driving(state, load_parameters, turns)[None]
+                    return model.driving(state, load_parameters, angle_branches)[None]
 
                 total += _required(directional_derivative(at, steps_along(inputs, leaf, each)))[0]
         finally:
@@ -136,7 +138,7 @@ def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.nd
             values = values_in_neighbour(inputs, leaf, step * change)
             with values.in_core():
                 there = values.scene._model
-                there.term_energies(state, found.turns, load_parameters)
+                there.term_energies(state, found.angle_branches, load_parameters)
                 return np.stack(
                     [there.gradient(state, load_parameters), there.driven_increment(state, load_parameters)]
                 )

@@ -126,7 +126,7 @@ class MotionInputs:
             {
                 "state": self.start.state,
                 "velocity": self.start.velocity,
-                "turns": self.start.angle_branches,
+                "angle_branches": self.start.angle_branches,
                 **self._history(law),
                 "rotations_given": self.start.rotations_known,
                 **law,

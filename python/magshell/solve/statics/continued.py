@@ -72,7 +72,7 @@ class DesignContinuation:
         solution, design = self._stored
         state = {
             "state": torch.tensor(solution.found.state),
-            "angle_branches": solution.found.turns,
+            "angle_branches": solution.found.angle_branches,
             "fine_faces": torch.from_numpy(fine_faces(solution.inputs.values)),
         }
         return state, packed(self._scene, design, torch.from_numpy)

@@ -94,7 +94,13 @@ def _connected(
     parameter, state, refusal, point = at.parameter, at.state, _refusal(inputs, moving, kind), None
     if not refusal:
         point = Located(
-            inputs, Line(before, inputs.load_parameters), kind, state, at.turns, parameter, found.mode
+            inputs,
+            Line(before, inputs.load_parameters),
+            kind,
+            state,
+            at.angle_branches,
+            parameter,
+            found.mode,
         )
         parameter, state, refusal = point.parameter, point.state, point.problem
     arrays = np.array(parameter), np.ascontiguousarray(inputs.scene._model.positions(state))

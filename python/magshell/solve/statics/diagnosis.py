@@ -66,7 +66,9 @@ def _seen(inputs, found) -> list[str]:
     state = failed.state if failed.state.size else found.state
     load_parameters = failed.load_parameters if failed.state.size else found.load_parameters
     with inputs.in_core():
-        energy = sum(energy for _, energy in scene._model.term_energies(state, found.turns, load_parameters))
+        energy = sum(
+            energy for _, energy in scene._model.term_energies(state, found.angle_branches, load_parameters)
+        )
     moved = np.linalg.norm(scene._model.positions(state) - scene.mesh.rest_positions, axis=1).max(initial=0.0)
     return [
         f"Then the energy was {energy:.3g} J, and the largest displacement {moved:.3g} m, "

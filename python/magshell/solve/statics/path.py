@@ -130,7 +130,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         return _follow(
             self._inputs,
             self._moving,
-            (found.state, found.turns, self._from, self._start),
+            (found.state, found.angle_branches, self._from, self._start),
             options,
             _checked_until(until),
             progress,
@@ -154,7 +154,9 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         options.require_stable = False
         point = self._points[index]
         inputs = self._inputs.with_values(self._moving.values(self.parameters[index])).without_tensors()
-        return solve(inputs, point.state, point.turns, load_parameters, load_parameters, options).equilibrium
+        return solve(
+            inputs, point.state, point.angle_branches, load_parameters, load_parameters, options
+        ).equilibrium
 
     def _solved_from(self, point: Any, parameter: float) -> Any:
         """Return the core's equilibrium at another parameter, searched from a point nearby; None if none is found."""
@@ -166,7 +168,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
             found = _core.find_equilibrium(
                 self.scene._model,
                 point.state,
-                point.turns,
+                point.angle_branches,
                 load_parameters,
                 load_parameters,
                 options,
@@ -210,7 +212,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         model, rows = self.scene._model, []
         for k, (point, load_parameters) in enumerate(zip(self._points, self._load_parameters, strict=True)):
             with self._values_at(k).in_core():
-                rows.append(model.driving(point.state, load_parameters, point.turns))
+                rows.append(model.driving(point.state, load_parameters, point.angle_branches))
         return np.array(rows)
 
     def _at_points(self, function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:

@@ -239,7 +239,7 @@ def _with_fine_faces_at_end(
             again = _core.find_equilibrium(
                 inputs.scene._model,
                 found.state,
-                found.turns,
+                found.angle_branches,
                 found.load_parameters,
                 to,
                 options,
@@ -297,7 +297,7 @@ def _result(
         memory=found.bytes,
         factorization=found.factorization,
         _state=found.state,
-        _angle_branches=found.turns,
+        _angle_branches=found.angle_branches,
         _load_parameters=found.load_parameters,
         _values=inputs.values,
         _own_points=points[n_v:] if scene.rigid_parts else None,
@@ -314,7 +314,7 @@ def arrays_of(scene: Scene, found: _core.StaticsResult) -> tuple[np.ndarray, ...
     return (
         np.ascontiguousarray(model.points(found.state)),
         model.edge_rotations(found.state),
-        model.driving(found.state, found.load_parameters, found.turns) if driven else np.zeros(0),
+        model.driving(found.state, found.load_parameters, found.angle_branches) if driven else np.zeros(0),
     )
 
 
