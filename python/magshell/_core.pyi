@@ -1406,7 +1406,7 @@ def rasterized(
     diffuse: typing.SupportsFloat | typing.SupportsIndex,
 ) -> numpy.typing.NDArray[numpy.uint8]:
     """
-    Paints triangles into an image (height, width, 4). surfaces: dictionaries with positions (n, 3) m on the screen and in depth, faces, colors, per_face, lit, smooth and opacity. window: (left, right, bottom, top) m.
+    Paints triangles into an image (height, width, 4). surfaces: dictionaries with positions (n, 3) m on the screen and in depth, faces, colors, per_face, lit, crease (degrees) and opacity. window: (left, right, bottom, top) m.
     """
 
 def sample_fields(

@@ -10,8 +10,8 @@ namespace magshell {
 // remains, whose square, by which it changes an energy near its minimum, is hidden by round-off; see test_fine_roof_takes_small_steps.
 constexpr double settled_step = 1e-3, hidden_part = settled_step * settled_step;
 constexpr double negligible_length = 1e-9;  // [-] of a line search; see test_strip_folds_onto_itself
-constexpr double energy_tolerance =
-    1e-12;  // [-] round-off of a sum of energies; see test_hard_case_reaches_its_answer
+// [-] Round-off of a sum of energies; see test_hard_case_reaches_its_answer.
+constexpr double energy_tolerance = 1e-12;
 // Displacement over the extent below which a step has settled, at an equilibrium or a saddle. [-] See
 // test_a_compressed_strip_leaves_the_saddle.
 constexpr double settled_part = 1e-4;
