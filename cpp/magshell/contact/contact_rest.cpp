@@ -8,8 +8,8 @@
 namespace magshell {
 namespace {
 
-// [-] Relative difference below which two areas count as equal: their smaller one then has half of its derivative from each, the mean of both
-// sides. Fixed by test_gradient_by_rest_positions_of_sheets_with_the_same_mesh_agrees_with_differences.
+// [-] Relative difference below which the areas of two edges count as equal: the derivative of the smaller area by each is then 1/2, the
+// mean of both sides. Fixed by test_gradient_by_rest_positions_of_sheets_with_the_same_mesh_agrees_with_differences.
 constexpr double same_area = 1e-9;
 
 template <class Part>
@@ -31,7 +31,7 @@ void ContactRest::add(const NearPair& near, const PairEnergy::ByPair& by) {
     if (near.pair.kind == PairKind::edge_edge) {
         add_edges(near, by);
     } else {
-        // The area is a multiple of that of the vertex.
+        // The area of the pair is proportional to that of its vertex.
         const SurfacePair& contact = phase_.contacts()[near.contact];
         const Index number = near.swapped ? contact.b : contact.a;
         const ContactSurface& surface = phase_.surfaces()[number];
@@ -58,14 +58,14 @@ void ContactRest::add_edges(const NearPair& near, const PairEnergy::ByPair& by) 
         if (same || areas[side] == smaller)
             by_edge_areas_[numbers[side]][edges[side]] +=
                 (same ? 0.5 : 1.0) * by.area * near.pair.area / areas[side];
-        const Vec3 edge = rest_[nodes[2 * side + 1]] - rest_[nodes[2 * side]];
+        const Vec3 edge = rest_[nodes[2 * side + 1]] - rest_[nodes[2 * side]];  // `parallel` ~ |edge|^2
         const Vec3 by_edge = (2.0 * by.parallel * near.pair.parallel / edge.squaredNorm()) * edge;
         by_nodes_.segment<3>(3 * nodes[2 * side + 1]) += by_edge;
         by_nodes_.segment<3>(3 * nodes[2 * side]) -= by_edge;
     }
 }
 
-// The room is half of the distance at rest.
+// The room of a pair (ContactPair::room) is half of its distance at rest; dd/dx_k = w_k n (contact/proximity.h).
 void ContactRest::add_room(const NearPair& near, double by_room) {
     PairPositions x;
     const int count = nodes_of(near.pair.kind);
@@ -80,7 +80,7 @@ void ContactRest::add_to(VectorXd& out) const {
     for (std::size_t s = 0; s < phase_.surfaces().size(); ++s) {
         const ContactSurface& surface = phase_.surfaces()[s];
         for (const ContactSurface::Face& face : surface.faces) {
-            double by_area = 0.0;
+            double by_area = 0.0;  // vertices and edges of a face each have a third of its area
             for (int k = 0; k < 3; ++k) {
                 const auto [low, high] = std::minmax(face[k], face[(k + 1) % 3]);
                 by_area += by_vertex_areas_[s][place_of(surface.vertices, face[k])] +

@@ -14,12 +14,12 @@
 namespace magshell {
 namespace {
 
-// [-] Decrease of the energy, over its size, below which a settled step counts as idle, and the number of them in a row after which no
-// equilibrium is expected: obstacles may hold a body where its energy still falls. See
+// [-] Decrease of the energy, over its size, below which a settled step counts as idle. After max_idle_steps of these in a row no equilibrium
+// is expected: an obstacle may hold a body at a place where its energy still has a slope. See
 // test_a_small_ball_that_would_slip_between_contact_points_is_an_error.
 constexpr double idle_decrease = 1e-10;
 constexpr int max_idle_steps = 5;  // see test_a_small_ball_that_would_slip_between_contact_points_is_an_error
-// [-] First shift, over the one that holds the body against the forces; see test_both_sides_of_a_saddle_cost_the_same.
+// [-] First shift over forced_shift(); see test_both_sides_of_a_saddle_cost_the_same.
 constexpr double first_shift = 0.02;
 
 class ProximalContinuation {
@@ -95,7 +95,7 @@ class ProximalContinuation {
         const bool at_rest = stationary_ || report_.residual <= newton_.options().tolerance;
         if (shift_ == 0.0 || at_rest) return assess_hessian(at_rest);
         if (!factorize_definite()) return fail("no step lowers the energy, however short");
-        // A shift that the step does not need may hide that the state is close to a saddle.
+        // The shift hides negative pivots: once steps have settled, the Hessian without it shows whether a saddle is close.
         return length(step_) >= settled_ || report_.last_displacement >= settled_ || assess_hessian(true);
     }
 
@@ -136,7 +136,7 @@ class ProximalContinuation {
                fail(factor_.succeeded ? "no step lowers the energy, however short" : factor_.reason);
     }
 
-    // Takes one step by L-BFGS or by mixed iterations. Returns false, with a reason in the report, if no attempt lowers the energy.
+    // Takes one step by L-BFGS or by mixed iterations. Returns false, with a reason, if all attempts fail or too many steps are idle.
     bool advance() {
         const double before = energy_;
         for (int attempt = 0; attempt < few; ++attempt) {
@@ -155,7 +155,7 @@ class ProximalContinuation {
                 return idle_steps_ < max_idle_steps || fail("no step lowers the energy, however short");
             }
             const bool moved = keep_best_state();
-            // The next step becomes shorter by the factor, and no longer than the extent.
+            // With the same stiffness along it, the next step is shorter by largest_factor, and no longer than the extent.
             const double shorter = std::max(largest_factor, whole / model_.extent());
             shift_ = std::max(largest_factor * shift_, shift_ + (shorter - 1.0) * stiffness);
             last_shift_ = shift_;
@@ -166,9 +166,9 @@ class ProximalContinuation {
         return fail("no step lowers the energy, however short");
     }
 
-    // Takes a step by the method that pays. L-BFGS steps are cheap, but in a narrow curved valley they creep; mixed iterations leave the
-    // valley's walls alone, so their steps grow by the shift factor each. After some rounds of L-BFGS they are tried, and go on while
-    // they lower the energy ever faster, or faster than L-BFGS, per factorization.
+    // Takes a step by the method that gains more. L-BFGS is cheap, but its steps are short in a narrow curved valley of the energy. Mixed
+    // iterations pass over the valley's walls (membrane energy), and go farther with every success, which lowers the shift. They are tried
+    // after `few` rounds of L-BFGS, and go on while their decrease of the energy per factorization is above that of L-BFGS, or grows.
     bool take_step() {
         if (!has_potential() || model_.capabilities().has_barrier) return reach_proximal_point();
         const double before = energy_;
@@ -188,7 +188,7 @@ class ProximalContinuation {
         return reached;
     }
 
-    // Returns true if the energy falls along the whole Newton step about as the quadratic model predicts.
+    // Returns true if the energy falls along the whole Newton step by more than good_part of what the quadratic model predicts.
     bool predicts_well() {
         const Model::AngleBranches angle_branches = model_.angle_branches();
         const double predicted = 0.5 * (slope() + shift_ * square(step_));
@@ -200,7 +200,7 @@ class ProximalContinuation {
         return energy_ - energy > good_part * predicted;
     }
 
-    // Descends by L-BFGS steps with the factorization at hand. Returns false, and leaves q as it was, if they do not get anywhere.
+    // Descends by L-BFGS steps with the factorization at hand. Returns false if the energy does not fall; q then stays, up to round-off.
     bool lbfgs_round() {
         const double before = energy_;
         LbfgsRound round = lbfgs_descent(newton_, q_, energy_, load_parameters_);
@@ -215,9 +215,9 @@ class ProximalContinuation {
         return true;
     }
 
-    // Solves for the proximal point by mixed iterations, the first of which is the step at hand; without a shift, for the equilibrium.
-    // Returns false, and leaves q as it was, if they do not converge, leave the stable states, or raise the energy by more than
-    // round-off.
+    // Solves for the proximal point, or without a shift for the equilibrium, by mixed iterations, which begin with the Newton step at hand.
+    // Returns false, and leaves q as it was, if they do not converge, leave the stable states, raise the energy by more than round-off, move
+    // a node by more than the extent, or pass through an obstacle.
     bool reach_proximal_point() {
         stationary_ = false;
         const bool exact = shift_ == 0.0;
@@ -272,7 +272,7 @@ class ProximalContinuation {
         return lower ? "the way passes through an obstacle" : "the energy of the state reached is higher";
     }
 
-    // Moves to the state of least energy, with the proximal term, that the last failed iteration passed through. Returns false if there is none.
+    // Moves to the state of least energy, with the proximal term, on the way of the last failed iteration. Returns false if there is none.
     bool keep_best_state() {
         if (best_.size() == 0 || crosses_obstacle(best_)) return false;
         report_.last_displacement = length(best_ - q_);
@@ -343,13 +343,13 @@ class ProximalContinuation {
                 return true;
             }
             raise_shift(times);
-            // No step is left that is not settled.
+            // With a larger shift every step is shorter than settled_part of the extent.
             if (!(shift_ > 0.0 && settled_part * shift_ <= std::max(largest_stiffness(), forced_shift())))
                 return false;
         }
     }
 
-    // Multiplies the shift, or begins with a part of the last one, or of the one that holds the body against the forces.
+    // Multiplies the shift, or if it is zero, sets it to a fraction of the last one, or without a last one, of forced_shift().
     void raise_shift(double times) {
         if (shift_ > 0.0)
             shift_ *= times;
@@ -359,8 +359,8 @@ class ProximalContinuation {
             shift_ = std::max(first_shift * forced_shift(), energy_tolerance * largest_stiffness());
     }
 
-    // Returns false if the energy does not decide which step is good, since some forces are not its derivatives: followers, torques on
-    // ball joints. Proximal points then are the steps of pseudo-transient continuation [Kelley, Keyes 1998].
+    // Returns true if all forces are derivatives of the energy, which then decides which step is good. Followers and torques on ball joints
+    // are not: proximal points then are the steps of pseudo-transient continuation [Kelley, Keyes 1998].
     bool has_potential() const { return !newton_.is_unsymmetric(); }
 
     VectorXd newton_step() const { return newton_.solve_with_factor(-newton_.gradient(q_, {})); }
@@ -377,7 +377,7 @@ class ProximalContinuation {
         return true;
     }
 
-    // Returns the shift [N/m3] at which the forces move a body held by the proximal term alone by its extent.
+    // Returns the shift [N/m3] at which the largest force per area moves a vertex by the extent against the proximal term alone.
     double forced_shift() const {
         const DofMap& dof_map = model_.dof_map();
         const VectorXd force = dof_map.vector(model_.residual().gradient),

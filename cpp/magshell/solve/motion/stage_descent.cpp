@@ -22,11 +22,11 @@ class ScopedFrozenForces {
     Model& model_;
 };
 
-// Standard steps that lower the energy of a stage, with fixed normal forces of friction, until the residual is below `enough`. Where the
-// matrix is indefinite, the inertia is multiplied by 1 + shift in it until the step goes downhill.
+// Standard Newton steps that lower the energy of a stage, with fixed normal forces of friction, until the residual is below `enough`. Where
+// the matrix is indefinite, the masses in it are multiplied by 1 + shift, large enough to make it positive definite.
 class DescendingSteps final : public NewtonIteration {
   public:
-    /// shift [-]: that of the last step; left for the next descent.
+    /// shift [-]: the one that the descent before ended with; updated for the next descent.
     DescendingSteps(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
                     const ProximalTerm& proximal, int max_iterations, double enough, double& shift)
         : NewtonIteration(newton, q, load_parameters, proximal, max_iterations),
@@ -40,12 +40,12 @@ class DescendingSteps final : public NewtonIteration {
 
     // Factorizes with the least shift that makes the pivots positive. Returns false, with a reason in the report, if none does.
     bool factorize_definite() {
-        // Factor by which the shift is raised and lowered, and the largest one [-]; see test_a_rolling_sheet_takes_whole_steps.
+        // Factor by which the shift is raised and lowered, and the largest shift [-]; see test_a_rolling_sheet_takes_whole_steps.
         constexpr double shift_factor = 4.0, largest_shift = 1e12;
         Eigen::MatrixXd no_moves(q_.size(), 0);
         shift_ = shift_ > 1.0 ? shift_ / shift_factor : 0.0;
         for (; shift_ <= largest_shift; shift_ = std::max(1.0, shift_factor * shift_)) {
-            // The shift is added about q, so the gradient there stays.
+            // The target moves with the weights so that the gradient at q does not change.
             const VectorXd weights = (1.0 + shift_) * *proximal_.weights,
                            target = q_ - (q_ - *proximal_.target) / (1.0 + shift_);
             const ProximalTerm shifted{&weights, &target, proximal_.motion};
@@ -80,13 +80,13 @@ class DescendingSteps final : public NewtonIteration {
 // rounds, until standard Newton converges.
 NewtonReport descend_in_rounds(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
                                const NewtonPolicy& policy) {
-    // Rounds, steps downhill per round, and standard Newton iterations after each; see test_sticks_at_050.
+    // Largest numbers of rounds, steps downhill in a round, and standard Newton iterations after it; see test_sticks_at_050.
     constexpr int most_rounds = 12, most_steps = 20, last_steps = 8;
-    constexpr double least_gain = 1e-2;  // [-] reduction of the residual in a round; see test_sticks_at_050
-    // Rounds in a row without progress after which the normal forces are expected to cycle, and the ratio of residuals [-] that counts as
-    // progress; see test_a_rolling_sheet_takes_whole_steps.
+    constexpr double least_gain = 1e-2;  // [-] final over first residual; see test_sticks_at_050
+    // Rounds in a row without progress after which no more follow, as the normal forces are expected to repeat themselves; see
+    // test_a_rolling_sheet_takes_whole_steps.
     constexpr int most_idle_rounds = 3;
-    constexpr double progress = 0.5;  // [-] see test_a_rolling_sheet_takes_whole_steps
+    constexpr double progress = 0.5;  // [-] residual over least; see test_a_rolling_sheet_takes_whole_steps
     const ProximalTerm& proximal = policy.proximal;
     NewtonPolicy standard = policy;
     standard.max_iterations = last_steps;
@@ -121,7 +121,7 @@ NewtonReport descend_in_rounds(Newton& newton, VectorXd& q, const LoadParameters
             return report;
         }
         newton.evaluate(q, load_parameters, proximal);
-        // Standard Newton may come close without converging: the next round then holds the normal forces found there.
+        // Standard Newton may come close without converging: the next round then starts there, with the normal forces found there.
         if (last.residual < newton.relative_residual(q, proximal)) {
             q = std::move(end);
             newton.evaluate(q, load_parameters, proximal);

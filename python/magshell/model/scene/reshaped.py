@@ -1,4 +1,4 @@
-"""A scene with other rest positions of its bodies, in which a solve computes whose `values` hold rest_positions."""
+"""The scene of a solve whose `values` contain rest_positions: another scene, with these rest positions of its bodies."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ REST = "rest_positions"
 class ReshapedScene(Scene):
     """A scene that differs from another one in the rest positions of some bodies.
 
-    Each edge has a direction of its own across it, since the directions of two edges of one line may turn differently. The
-    points that stand for the inertia of a rigid body stay, as their places in it are arbitrary.
+    Each held edge has a direction across it of its own: two edges of one line, which share one in other scenes, may turn
+    differently. The points that represent the inertia of a rigid body are those of the other scene, as any places will do.
     """
 
     _shares_directions = False
@@ -40,9 +40,9 @@ class ReshapedScene(Scene):
 def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] = ()) -> tuple[Scene, Any]:
     """Return the scene in which a solve computes with these values, and the values by the objects of that scene.
 
-    no_gradient_with: what the solve has, besides the scene, that has no derivative by rest positions.
+    no_gradient_with: words for what has no derivative by rest positions in this kind of solve only.
 
-    Without rest_positions among the values they are returned as they are. Raises ValueError for rest positions that do
+    Without rest_positions among the values, both are returned unchanged. Raises ValueError for rest positions that do
     not fit, or in a scene with something that cannot follow them; NoGradient if a gradient by them is asked for and
     something in the scene has none.
     """
@@ -58,14 +58,14 @@ def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] = ()) ->
 
 
 def turning_supports(scene: Scene) -> list[str]:
-    """Return words for supports that rotate, whose turn a solve changes: those have no derivative by rest positions yet."""
-    supports = getattr(scene, "supports", ())  # a solve refuses what is no scene after this
+    """Return words for supports that rotate, if any: on paths and in motions they have no derivative by rest positions."""
+    supports = getattr(scene, "supports", ())  # what is no Scene is refused later, by the solve
     moved = [support for support in supports if isinstance(support, Pin | Clamp)]
     return ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
 
 
 def rigid_vertices(scene: Scene) -> list[str]:
-    """Return words for vertices that rigid bodies carry, as their free flight has no derivative by where these are."""
+    """Return words for vertices of rigid bodies, if any: in motions those have no derivative by their rest positions."""
     carried = any(part.vertices is not None for part in getattr(scene, "rigid_parts", ()))
     return ["vertices that belong to a RigidBody"] * carried
 
@@ -102,7 +102,7 @@ def given_rest(scene: Scene, values: dict[Any, dict[str, Any]]) -> Any:
 
 
 def _rest_positions(scene: Any, values: Any) -> dict[Any, Any]:
-    """Return the rest positions among the values, {body: (n_v, 3)}; `requested` reports what else is wrong with them."""
+    """Return the rest positions among the values, {body: (n_v, 3)}; `requested` reports mistakes in the values later."""
     if not isinstance(scene, Scene) or not isinstance(values, dict):
         return {}
     return {
@@ -121,11 +121,11 @@ def _numbers(body: Shell | Solid, value: Any) -> np.ndarray:
 
 
 def _made(scene: Scene, numbers: dict[Any, np.ndarray]) -> ReshapedScene:
-    """Return the scene with these rest positions; the last one made is made once."""
-    before = vars(scene).get("_reshaped")
-    if before is not None and before[0].keys() == numbers.keys():
-        if all(np.array_equal(before[0][body], x) for body, x in numbers.items()):
-            return before[1]
+    """Return the scene with these rest positions: the last one made, if it has the same, or a new one."""
+    last = vars(scene).get("_reshaped")
+    if last is not None and last[0].keys() == numbers.keys():
+        if all(np.array_equal(last[0][body], x) for body, x in numbers.items()):
+            return last[1]
     there = _with_rest(scene, numbers)
     remember(
         there,
@@ -139,7 +139,7 @@ def _made(scene: Scene, numbers: dict[Any, np.ndarray]) -> ReshapedScene:
 
 
 def neighbour(scene: Scene, numbers: dict[Any, np.ndarray]) -> ReshapedScene:
-    """Return a scene with these rest positions in the numbering of this one, for differences along a change of them.
+    """Return a scene with these rest positions in the numbering of this one, for finite differences by rest positions.
 
     Raises ValueError for rest positions that do not fit.
     """
@@ -151,9 +151,9 @@ def neighbour(scene: Scene, numbers: dict[Any, np.ndarray]) -> ReshapedScene:
 def _with_rest(
     scene: Scene, numbers: dict[Any, np.ndarray], numbered_like: Scene | None = None
 ) -> ReshapedScene:
-    """Make the scene with these rest positions, which knows what stands in for the objects of the given one."""
+    """Make the scene with these rest positions, whose `_stand_ins` are the objects in place of those of the given one."""
     now = {id(body): body.replaced(rest_positions=x) for body, x in numbers.items()}
-    own: dict[int, Any] = {}
+    stand_ins: dict[int, Any] = {}
 
     def stand_in(item: Any) -> Any:
         if isinstance(item, RigidBody):
@@ -164,19 +164,20 @@ def _with_rest(
         else:
             found = now.get(id(item)) or _about(item, now)
         if found is not item:
-            own[id(item)] = found
+            stand_ins[id(item)] = found
         return found
 
     arguments = {
         name: tuple(map(stand_in, each)) if isinstance(each, tuple) else each
         for name, each in Scene.__getstate__(scene).items()
     }
-    there = ReshapedScene.__new__(ReshapedScene)
+    there = ReshapedScene.__new__(ReshapedScene)  # whose __init__ reads the attributes that follow
     remember(there, _numbered_like=numbered_like, _rigid_like=scene)
     there.__init__(**{**arguments, "allow_rigid_motions": True})
-    own[id(scene)] = there
-    own |= {id(body.skin): now[id(body)].skin for body in numbers if getattr(body, "skin", None) is not None}
-    remember(there, _stand_ins=own)
+    stand_ins[id(scene)] = there
+    skinned = [body for body in numbers if getattr(body, "skin", None) is not None]
+    stand_ins |= {id(body.skin): now[id(body)].skin for body in skinned}
+    remember(there, _stand_ins=stand_ins)
     _check_same_ties(scene, there)
     for contact in there.contacts:
         if isinstance(contact, SelfContact):
@@ -185,7 +186,7 @@ def _with_rest(
 
 
 def _about(item: Any, now: dict[int, Any]) -> Any:
-    """Return an object of the scene in which the bodies with the ids in `now` are replaced by its values."""
+    """Return the object in which bodies are replaced by those with other rest positions, `now`, by the ids of the former."""
 
     def named(value: Any) -> Any:
         if id(value) in now:

@@ -7,10 +7,10 @@ import numpy as np
 from ..results.state import State
 from .outlines import of_closed, towards_eye
 
-PARTS = 4  # of an edge, each of which is shown or hidden
+PARTS = 4  # number of parts of an edge, each of which is shown or hidden
 # [-] Distances over the mean edge length. A point this far outside an edge on the screen shows what is behind the edge.
 ASIDE = 0.05
-# Surfaces that are nearer behind an edge belong to a fold, whose edges are no outline; fixed by
+# A surface behind an edge that is nearer to it than this belongs to a fold, and the edge is no outline; fixed by
 # test_edges_in_front_of_a_near_surface_are_no_silhouettes.
 GAP = 0.5
 
@@ -18,7 +18,7 @@ GAP = 0.5
 def silhouettes(state: State, eye: np.ndarray) -> np.ndarray:
     """Return the parts of edges of closed surfaces that are outlines for the direction (3,) of the eye, (k, 2, 3) m.
 
-    The surface that follows behind them is farther away, or there is none.
+    Behind such a part the next surface is farther away than GAP allows, or there is none.
     """
     mesh, edges = state.mesh, turning_edges(state, eye)
     if not len(edges):
@@ -42,14 +42,14 @@ def turning_edges(state: State, eye: np.ndarray) -> np.ndarray:
 
 
 def _axes(eye: np.ndarray) -> np.ndarray:
-    """Return unit vectors across and along the direction of the eye, as the rows of a matrix (3, 3)."""
+    """Return a matrix (3, 3) whose rows are two unit vectors that span the screen, and the direction of the eye."""
     right = np.cross(np.eye(3)[np.argmin(np.abs(eye))], eye)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(eye, right), eye])
 
 
 def _outwards(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """Return the unit vectors (k, 2) of the screen across edges, away from their faces."""
+    """Return unit vectors (k, 2) on the screen that are perpendicular to edges and point away from their faces."""
     mesh = state.mesh
     ends = state.positions[mesh.edges[edges]] @ _axes(eye).T
     along = (ends[:, 1] - ends[:, 0])[:, :2]
@@ -60,17 +60,17 @@ def _outwards(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
 
 
 def _depths(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the depth (k,) m of the nearest triangle at each point (k, 2) m of the screen, -inf where there is none.
+    """Return how far towards the eye the nearest triangle is at each point (k, 2) m of the screen, (k,) m; -inf without one.
 
-    triangles: (m, 3, 3) m, right, up and towards the eye.
+    triangles: corners (m, 3, 3) m along the rows of `_axes`, so that a larger third coordinate is nearer to the eye.
     """
     point, triangle = _near(triangles[:, :, :2], points)
     a, b, c = np.moveaxis(triangles[triangle], 1, 0)
-    one, other, there = (b - a)[:, :2], (c - a)[:, :2], points[point] - a[:, :2]
+    one, other, offset = (b - a)[:, :2], (c - a)[:, :2], points[point] - a[:, :2]
     area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        s = (there[:, 0] * other[:, 1] - there[:, 1] * other[:, 0]) / area
-        t = (one[:, 0] * there[:, 1] - one[:, 1] * there[:, 0]) / area
+        s = (offset[:, 0] * other[:, 1] - offset[:, 1] * other[:, 0]) / area
+        t = (one[:, 0] * offset[:, 1] - one[:, 1] * offset[:, 0]) / area
     inside = (area != 0.0) & (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
     found = np.full(len(points), -np.inf)
     depths = a[:, 2] + s * (b - a)[:, 2] + t * (c - a)[:, 2]
@@ -79,9 +79,9 @@ def _depths(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def _near(triangles: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return pairs of points and triangles (m, 3, 2) of the screen that are in one cell of a grid, (p,) each.
+    """Return the indices (p,) of points, and of triangles (m, 3, 2), that share a cell of a grid on the screen.
 
-    The cells are as large as the largest triangle, so that a triangle is in four at most.
+    The cells are as large as the largest triangle, so that a triangle touches four of them at most.
     """
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     cell = float((high - low).max())

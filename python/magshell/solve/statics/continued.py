@@ -73,12 +73,13 @@ class DesignContinuation:
         state = {
             "state": torch.tensor(solution.found.state),
             "angle_branches": solution.found.angle_branches,
+            # which faces sample the applied field finely (model/scene/fine_faces.py)
             "fine_faces": torch.from_numpy(fine_faces(solution.inputs.values)),
         }
         return state, packed(self._scene, design, torch.from_numpy)
 
     def restore(self, state: dict[str, Any], design: dict[Any, Any]) -> None:
-        """Continue from the result of `state` of another object, with the same bits."""
+        """Continue from what `state` of another object returned, with bitwise the same results."""
         arguments = unpacked(self._scene, design)
         scene, values = reshaped(self._scene, arguments.get("values"))
         inputs = inputs_of(scene, {**arguments, "values": values})
@@ -98,8 +99,9 @@ class DesignContinuation:
         return find(self._scene, arguments, start, search, store_factor=True)
 
     def _in_steps(self, last: ReachedEquilibrium, arguments: dict[Any, Any], search: Search) -> Solution:
-        """Find the equilibrium of a new design. Steps between designs are halved until each stays near its first-order
-        change.
+        """Find the equilibrium of a new design, in steps along the straight line from the last design to it.
+
+        A step is halved until its equilibrium is near the one that the first-order change predicts.
         """
         solution, new = last.solution, numbers_only(arguments)
         at, step = 0.0, 1.0
@@ -121,42 +123,46 @@ class DesignContinuation:
     def _tried(self, last: Solution, arguments: dict[Any, Any], search: Search) -> Solution | None:
         """Find the next equilibrium; return None if it does not continue the last one."""
         try:
-            there = self._solved(arguments, last.equilibrium, search)
+            new = self._solved(arguments, last.equilibrium, search)
         except NotConverged:
             return None
-        if there.equilibrium.saddles_escaped or there.equilibrium.relaxation_steps:
+        if new.equilibrium.saddles_escaped or new.equilibrium.relaxation_steps:
             return None
-        return there if self._continues(last, there) else None
+        return new if self._continues(last, new) else None
 
-    def _continues(self, last: Solution, there: Solution) -> bool:
-        model, before = there.inputs.scene._model, last.inputs.scene._model
-        if model is before:
-            with there.inputs.in_core():
-                expected = _core.first_order_change(model, last.found, there.inputs.load_parameters)
-            expected = model.positions(expected)
-        else:
-            expected = _first_order_change(last, there)
-        moved = model.positions(there.found.state) - before.positions(last.found.state)
+    def _continues(self, last: Solution, new: Solution) -> bool:
+        """Return whether the new equilibrium is near the one that the first-order change predicts."""
+        model, last_model = new.inputs.scene._model, last.inputs.scene._model
+        if model is last_model:
+            with new.inputs.in_core():
+                change = _core.first_order_change(model, last.found, new.inputs.load_parameters)
+            expected = model.positions(change)
+        else:  # other rest positions
+            expected = _first_order_change(last, new)
+        moved = model.positions(new.found.state) - last_model.positions(last.found.state)
         deviation, size = _largest(moved - expected), _largest(expected)
         return deviation <= max(_MAX_DEVIATION * size, _NO_JUMP * self._scene._bodies.extent)
 
 
-def _first_order_change(last: Solution, there: Solution) -> np.ndarray:
+def _first_order_change(last: Solution, new: Solution) -> np.ndarray:
     """Return the change of positions to first order, from an equilibrium to one with other rest positions, (n_v, 3) m.
 
-    The two scenes number their unknowns differently, so forces and motions are transferred by vertices and edges.
+    It is the response of the last equilibrium to the forces, and to the motions of supports, that the new scene has at the
+    last positions. The two scenes number their unknowns differently, so both are transferred by vertices and edges.
     """
-    theirs, ours = last.inputs.scene, there.inputs.scene
-    if (held := directions_of(ours)) != directions_of(theirs):
+    last_scene, new_scene = last.inputs.scene, new.inputs.scene
+    if (directions := directions_of(new_scene)) != directions_of(last_scene):
         raise ValueError(f"{REST} must be given in every call of a WarmStart, or in none")
-    state, model = state_in(ours, last.equilibrium), ours._model
-    with there.inputs.in_core():
-        forces = renumbered_vector(theirs, ours, model.gradient(state, there.inputs.load_parameters))
-        increment = model.driven_increment(state, there.inputs.load_parameters)
-    moved = renumbered_vector(theirs, ours, increment)
-    moved[held] = increment[held]
+    state, model = state_in(new_scene, last.equilibrium), new_scene._model
+    with new.inputs.in_core():
+        gradient = model.gradient(state, new.inputs.load_parameters)
+        increment = model.driven_increment(state, new.inputs.load_parameters)
+    gradient_change = renumbered_vector(last_scene, new_scene, gradient)
+    prescribed = renumbered_vector(last_scene, new_scene, increment)
+    prescribed[directions] = increment[directions]  # which renumbered_vector sets to zero
     with last.inputs.in_core():
-        return theirs._model.positions(_core.push_forward(theirs._model, last.found, forces, moved))
+        change = _core.push_forward(last_scene._model, last.found, gradient_change, prescribed)
+        return last_scene._model.positions(change)
 
 
 def _largest(displacements: np.ndarray) -> float:
