@@ -56,8 +56,9 @@ def of_a_batch(solve, of_linear=False) -> Kind:
     return Kind(everything(), controls, solve=solve, fixed=EXACT, reach=REACH, of_linear=of_linear)
 
 
+RESPONSES = "a sheet in a batch of linear responses"  # which cannot be saved
 BATCH_MAKERS = {
     "a sheet in a batch of equilibria": lambda: of_a_batch(one_of_equilibria),
     "a sheet in a batch of warm starts": lambda: of_a_batch(one_of_warm_starts),
-    "a sheet in a batch of linear responses": lambda: of_a_batch(one_of_responses, of_linear=True),
+    RESPONSES: lambda: of_a_batch(one_of_responses, of_linear=True),
 }

@@ -16,7 +16,7 @@ from .._input.scalars import flag, positive
 from .._input.tensors import require_torch, requires_gradient
 from .._runtime.keywords import FLUX_DENSITY, nearest_first
 from .._runtime.solver_entry_point import grouped
-from ..errors import NotConverged
+from ..errors import NoGradient, NotConverged
 from ..model.scene.scene import Scene
 from ..output.plot.limits import checked_width
 from ..output.plot.style import Style, style_of
@@ -193,6 +193,8 @@ class Environment(gymnasium.Env):
             f"{self._shape}, {self.actions_per_episode} actions of {self.time_step * self.steps_per_action:g} s per episode)"
         )
 
+    __str__ = __repr__  # gymnasium's would name the class only
+
     def reset(
         self, *, seed: int | None = None, options: dict[Any, Any] | None = None
     ) -> tuple[np.ndarray, dict[Any, Any]]:
@@ -206,9 +208,17 @@ class Environment(gymnasium.Env):
         return observation, info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[Any, Any]]:
-        """Take one action: returns (observation, reward, terminated, truncated, info)."""
+        """Take one action: returns (observation, reward, terminated, truncated, info).
+
+        Raises NoGradient for an action that is a tensor with requires_grad: `differentiable_step` has gradients.
+        """
         if self._now is None:
             raise RuntimeError("reset must be called before the first step of an episode")
+        if getattr(action, "requires_grad", False):
+            raise NoGradient(
+                "step returns arrays, which have no gradients: take differentiable_step(state, action), or give step "
+                "action.detach()"
+            )
         within, clipped = self._bounds.action(action, self.action_space.shape)
         values = self._values(within, self._now.time, self._setting)
         before = Snapshot(self._now.motion, self._now.index, self._now.action)

@@ -224,7 +224,7 @@ def test_motion_has_strains_in_each_state(dtype):
 def test_large_strain_is_warned_of_at_the_callers_line():
     """Check a strip at 1000 T, which is "stable" at several times its length."""
     with pytest.warns(
-        ms.LargeStrainWarning, match=r"^mT for T.*40 of 40 faces are, the first of them \d"
+        ms.LargeStrainWarning, match=r"^mT for T.*40 of 40 faces are beyond it: the first of them \d"
     ) as caught:
         found = in_field(1000.0, strip(cells=(10, 2), field=ms.UniformField()))
     assert found.stable and found.largest_membrane_strain > 2.0

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from ..._input.arrays import index_array, named_values
+from ..._input.path_first import check_path_first
 from ..._input.quantity import quantity, shape_of
 from ..._input.tensors import detached
 from ..._runtime.files import replacing
@@ -51,7 +52,7 @@ _MESHIO_MODULES = {".stl": "stl", ".vtu": "vtu", ".vtk": "vtk", ".msh": "gmsh"}
 _READABLE = (".obj", ".ply", ".inp", *_MESHIO_MODULES)
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}  # m
 # [m] Sizes of a mesh beyond these limits are taken as a wrong unit of the file; test_sizes_of_a_wrong_unit_are_warned_of.
-_PLAUSIBLE_SIZES = (1e-5, 10.0)
+_PLAUSIBLE_SIZES = (1e-5, 3.0)
 _WRITERS = (".vtu", ".msh", ".ply")
 _LOWER_CELLS = ("vertex", "line", "line3")  # gmsh writes them in addition to the surface
 _TRIANGLES = ("triangle", "triangle6")
@@ -87,7 +88,7 @@ def read_mesh(path: FilePath, drop_unused: bool = False, unit: str = "m") -> Tri
 
     Warns:
         MeshGroupWarning: once, of all that is not read: keywords of an INP file, members of groups that are not in the mesh.
-        UnitWarning: if the mesh is larger than 10 m or smaller than 10 um.
+        UnitWarning: if the mesh is larger than 3 m or smaller than 10 um.
 
     Raises:
         FileNotFoundError: if there is no such file.
@@ -168,6 +169,7 @@ def write_mesh(
     ...     ms.read_mesh(f"{folder}/sheet.ply").n_faces
     40
     """
+    check_path_first("write_mesh(path, mesh)", path, mesh)
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in _WRITERS:
@@ -274,7 +276,12 @@ def _sheet(
 ) -> tuple[TriangleMesh | QuadraticTriangleMesh, Fields]:
     """Build the mesh of triangles and its fields from the content of a file."""
     if len(found.faces) == 0:
-        raise ValueError(f"{str(path)!r} holds no triangles")
+        saved = (
+            ": gmsh writes only members of physical groups once there is one, so add one of the surfaces"
+            if path.suffix.lower() == ".msh"
+            else ""
+        )
+        raise ValueError(f"{str(path)!r} holds no triangles{saved}")
     found.faces = index_array(f"the faces of {str(path)!r}", found.faces)
     if found.points.shape[1] == 2:
         found.points = np.column_stack([found.points, np.zeros(len(found.points))])

@@ -40,7 +40,7 @@ def magnetization_from_remanence(residual_flux_density: Numbers) -> Any:
     return float(remanent) if remanent.ndim == 0 else remanent
 
 
-FIELDS = "fields of magshell (of magpylib's sources, ms.MagpylibField)"
+FIELDS = "fields of magshell (one that solves apply: ms.UniformField(); magpylib's sources: ms.MagpylibField)"
 _MOST_SAMPLES = 10**9  # largest number of samples of a grid; 24 GB
 
 

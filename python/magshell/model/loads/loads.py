@@ -12,7 +12,7 @@ from ..._input.selections import indices, selection
 from ...mesh.face_shapes import nodal_areas, nodal_lengths
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
-from ..bodies.bodies import checked_body
+from ..bodies.bodies import checked_body, on_body
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 
@@ -34,6 +34,9 @@ class DeadLoad(Owner):
         """Store and check the value of the load. label: its name and unit, as in "force [N]"."""
         self._label, self.body = label, checked_body(body)
         setattr(self, self._replaceable[0], _vectors(*label.rstrip("]").split(" [", 1), values))
+
+    def __repr__(self) -> str:
+        return _described(self)
 
     def vertex_forces(self, mesh: TriangleMesh) -> np.ndarray:
         """Return the forces on the vertices, (n_v, 3) N."""
@@ -57,6 +60,17 @@ class DeadLoad(Owner):
     def _nodal_weights(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
         """Return the vertices of each part (k, m), and the weights of the value there, (k, 1) or (k, m)."""
         raise TypeError(f"{type(self).__name__} is no load of its own")
+
+
+def _described(load: Any) -> str:
+    """Return the repr of a load: how many vertices, edges or faces it acts on."""
+    name = next(each for each in ("vertices", "edges", "faces") if hasattr(load, each))
+    chosen = getattr(load, name)
+    if chosen is None:
+        where = f"all {name}"
+    else:
+        where = f"{np.count_nonzero(chosen) if chosen.dtype == bool else len(chosen)} {name}"
+    return f"{type(load).__name__}({where}{on_body(load.body)})"
 
 
 class PointLoad(DeadLoad):
@@ -176,6 +190,9 @@ class EdgeCouple(Owner):  # plain-words: ok
         if array.shape not in ((), (3,)):
             raise ValueError(f"couple_per_length [N] must be a number or have shape (3,), got {array.shape}")
         self.couple_per_length: np.ndarray = quantity("couple_per_length", "N", array, array.shape)
+
+    def __repr__(self) -> str:
+        return _described(self)
 
     def _edge_moments(self, mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
         """Return the edges (k,) and their moments (k,), N m.

@@ -135,7 +135,9 @@ def _faces(strains: Strains) -> str:
     beyond = np.flatnonzero(~(largest <= SMALL))
     named = beyond[np.argsort(-largest[beyond], kind="stable")][:_MOST_NAMED]
     first = "the first of them " if len(beyond) > len(named) else ""
-    return f"{len(beyond)} of {len(largest)} faces are, {first}{', '.join(map(str, named.tolist()))}"
+    return (
+        f"{len(beyond)} of {len(largest)} faces are beyond it: {first}{', '.join(map(str, named.tolist()))}"
+    )
 
 
 def _percent(strain: float) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..._core import __version__
+from ..._input.path_first import check_path_first
 from ..._input.quantity import quantity
 from ..._runtime.files import replace_file
 from ..._runtime.mixins import register_method
@@ -116,8 +117,8 @@ def save(path: str | Path, result: Equilibrium | EquilibriumSet | Trajectory) ->
     numpy can read the file as well: `np.load(path)["positions"]`, m. An existing file is replaced once the new one is
     complete.
 
-    Raises ValueError for other objects, and for a scene with an object that has no digest, such as a function that contains
-    a lock; OSError if the file cannot be written.
+    Raises ValueError for other objects, for a path that does not end in .npz, and for a scene with an object that has no
+    digest, such as a function that contains a lock; OSError if the file cannot be written.
 
     >>> import magshell as ms, numpy as np, tempfile
     >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
@@ -130,12 +131,18 @@ def save(path: str | Path, result: Equilibrium | EquilibriumSet | Trajectory) ->
     >>> np.array_equal(again.positions, rest.positions), again.energies == rest.energies
     (True, True)
     """
+    check_path_first("save(path, result)", path, result)
     if type(result) not in _KINDS.values():
         points = ": save its points, ms.EquilibriumSet(path.equilibrium(k) for k in ...)"
         why = points if type(result).__name__ == "EquilibriumPath" else ""
         why = ": several are ms.EquilibriumSet([...])" if isinstance(result, list | tuple) else why
         raise ValueError(
             f"result must be an Equilibrium, EquilibriumSet or a Trajectory, got {type(result).__name__}{why}"
+        )
+    if (suffix := Path(path).suffix) != ".npz":
+        raise ValueError(
+            f"a result is saved as .npz, got {suffix or 'no ending'}; ms.write_series (.pvd) and ms.write_mesh (.vtu) "
+            "write what ParaView reads"
         )
     scene, arrays = result.scene, []
     held = to_plain(_fields(result, scene), arrays, "the result")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.arrays import named_values
+from ..._input.path_first import check_path_first
 from ..._input.quantity import quantity, shape_of
 from ..._input.tensors import detached
 from ..._runtime.files import replacing
@@ -152,6 +153,7 @@ def write_series(
     ...     ms.write_series(f"{folder}/rise.pvd", strip, positions=rising, times=(0, 0.1, 0.2)).name
     'rise.pvd'
     """
+    check_path_first("write_series(path, result)", path, what)
     path = Path(path)
     if path.suffix.lower() != ".pvd":
         raise ValueError(f"a series is saved as .pvd, got {path.name!r}; write_mesh writes one state as .vtu")

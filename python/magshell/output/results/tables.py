@@ -71,10 +71,9 @@ def to_pandas(
 ) -> pandas.DataFrame:
     """Convert a result to a pandas.DataFrame (needs the package pandas), with units in the names of its columns.
 
-    per: "state" gives one row per state, with energies, strains the uniform field, and in fields
-        that vary in space the factor on them. "vertex" gives one row per vertex and
-        state, with its position and, for a motion, its velocity. The index is `time [s]` of a Trajectory, `parameter` of an
-        EquilibriumPath or `case` of an EquilibriumSet, and `vertex`.
+    per: "state" gives one row per state, with energies, strains and the uniform field, and in fields that vary in space the
+        factor on them. "vertex" gives one row per vertex and state, with its position and, for a motion, its velocity. The
+        index is `time [s]` of a Trajectory, `parameter` of an EquilibriumPath or `case` of an EquilibriumSet, and `vertex`.
     probes: each ms.Probe adds its columns to those of the states; a reaction or contact force on a path solves its points
         again.
 
