@@ -20,7 +20,7 @@ import scipy
 
 import magshell as ms
 from magshell.model.scene.finer_scene import finer_scene
-from magshell.solve.accuracy.enriched import load_parameters, positions_of
+from magshell.solve.accuracy.enriched import load_keywords, positions_of
 from magshell.solve.accuracy.error_estimate import finer_meshes
 from magshell.solve.accuracy.output_value import Output
 from magshell.solve.adjoint.factorized import Factorized
@@ -37,11 +37,11 @@ class Stiffness:
     """The stiffness at rest of a scene, and its loads, for the free unknowns."""
 
     def __init__(self, scene: ms.Scene, result: Any):
-        self.model, inputs = scene._model, inputs_of(scene, load_parameters(result))
+        self.model, inputs = scene._model, inputs_of(scene, load_keywords(result))
         with inputs.in_core():
-            rest, none = self.model.rest_state(), scene._control_layout.zeros()
+            rest, none = self.model.rest_state(), scene._load_parameter_layout.zeros()
             size, starts, rows, entries = self.model.hessian(rest, none)
-            pulled = self.model.gradient(rest, none) - self.model.gradient(rest, inputs.controls)
+            pulled = self.model.gradient(rest, none) - self.model.gradient(rest, inputs.load_parameters)
         self.loads: np.ndarray = self.model.reduce(pulled)
         lower = scipy.sparse.csc_array((entries, rows, starts), shape=(size, size))
         diagonal = scipy.sparse.diags_array(lower.diagonal())

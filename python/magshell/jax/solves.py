@@ -16,7 +16,7 @@ from .._runtime.solve_keywords import keywords_of
 from ..model.scene.batch_axis import BatchAxis
 from ..model.scene.scene import Scene
 from ..solve.options import MixedNewton, Newton
-from ..solve.statics.batch import find_along
+from ..solve.statics.batch import find_along, from_starts
 from ..solve.statics.single_solve import Search
 from .library import require_double_precision, require_jax
 
@@ -202,7 +202,8 @@ class _Solves:
         members = len(numbers[0]) if numbers else 1
         known = dict.fromkeys(self._names, differentiable)
         axis = BatchAxis(self._scene, {**given, "values": values or None}, members, known)
-        batch, adjoint = find_along(axis, self._scene, None, None, self._search)
+        found = from_starts(self._scene, None, self._search, members)
+        batch, adjoint = find_along(axis, self._scene, None, found, self._search)
         for error in batch.failed.values():
             raise error
         positions, edge_rotations = map(detached, (batch.positions, batch.edge_rotations))

@@ -250,8 +250,6 @@ def test_combinations_with_ties_are_refused_by_name() -> None:
         ms.equilibrium(scene).reaction(tie)
     with pytest.raises(ValueError, match="EqualDisplacement or Periodic"):
         ms.error_estimate(ms.equilibrium(scene), lambda result: result.positions[0, 2])
-    with pytest.raises(ValueError, match="EqualDisplacement or Periodic"):
-        ms.equilibrium(scene, values={scene.bodies[0]: {"rest_positions": MESH.rest_positions * 1.01}})
     with pytest.raises(ValueError, match="free motions of a scene with EqualDisplacement"):
         ms.free_motions(scene)
 
