@@ -17,7 +17,7 @@ IN_MOTION = [name for name in MAKERS if kind(name).function is ms.simulate]
 PRECISION, ROUNDING = 1e-9, 1e-13  # of the tangent, and of the result itself
 # Tangents contain differences of friction and contact at the beginning of a step. Steps in contact multiply their errors
 # some tenfold: 1e-12 of velocities after two steps, 3e-8 after six. Gradients have none: with a smaller residual they change
-# by 1e-11, tangents by 1e-8.
+# by 1e-11, tangents of velocities by 1e-7.
 PRECISIONS = {"onto a Plane, contact implicit": 2e-8}
 # Kinds in which every input is tried alone, too, so that large tangents by others do not hide its own.
 ALONE = ("in motion, tr_bdf2", "sheets rubbing late, contact implicit")

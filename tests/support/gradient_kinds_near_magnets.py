@@ -56,5 +56,5 @@ def near_magnets(moves: bool) -> Kind:
     inputs = {"applied_flux_density": np.array([1e-3, -2e-3, 2e-3]), "field_factor": 0.8}
     if not moves:
         return Kind(scene, inputs, fixed=EXACT, reach=REACH)
-    fixed = {**EXACT, "steps": 2, "integrator": ms.TRBDF2(), "progress": False}
+    fixed = {**EXACT, "steps": 3, "integrator": ms.TRBDF2(), "progress": False}
     return Kind(scene, {**inputs, "time_step": 1e-3}, ms.simulate, fixed=fixed, step=1e-3, reach=REACH)
