@@ -16,7 +16,7 @@ For two parallel magnets 10 mm wide, 0.2 mm thick and 0.2 mm apart one point is 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -127,15 +127,12 @@ def is_suspect(estimate: float) -> bool:
     return not estimate <= _SUSPECT
 
 
-def warn_of_sampling(
-    values: Values, positions: np.ndarray, field_factor: float, flux_density: Any, where: str
-) -> None:
+def warn_of_sampling(found: Iterable[SamplingError], where: str) -> None:
     """Warn if the magnetic force on a body is off by more than 1 %, or if that cannot be told.
 
-    values: with the field sources as in this state. positions: (n_v, 3) m. field_factor: of the sources. flux_density:
-    (3,) T of a uniform field, or None.
+    found: the errors of all bodies, by sampling_errors().
     """
-    found = list(sampling_errors(values, positions, field_factor, flux_density))
+    found = list(found)
     worst = max(found, key=lambda each: each.error, default=None)
     if worst is not None and worst.error > TRUSTED:
         _warn(
@@ -175,7 +172,11 @@ def _warn(text: str) -> None:
 def sampling_errors(
     values: Values, positions: np.ndarray, field_factor: float, flux_density: Any
 ) -> Iterator[SamplingError]:
-    """Yield the error of each body with magnetized three-node faces, if a field varies in space."""
+    """Yield the error of each body with magnetized three-node faces, if a field varies in space.
+
+    values: with the field sources as in this state. positions: (n_v, 3) m. field_factor: of the sources. flux_density:
+    (3,) T of a uniform field, or None.
+    """
     fields = [
         each._core
         for each in map(values.current, values.scene.fields)

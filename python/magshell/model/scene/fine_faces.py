@@ -79,25 +79,35 @@ def with_fine_faces(
 
     estimate: of the core for this state, if it is known.
     """
+    return with_fine_faces_and_errors(inputs, state, load_parameters, estimate)[0]
+
+
+def with_fine_faces_and_errors(
+    inputs: Inputs, state: np.ndarray, load_parameters: np.ndarray, estimate: float | None = None
+) -> tuple[Inputs, list[SamplingError] | None]:
+    """Return what with_fine_faces() returns, and the errors of sampling in this state before; None if not computed."""
     scene = inputs.scene
     if not _keys(scene._value_layout):
-        return inputs
+        return inputs, None
     if estimate is None:
         if _is_far(inputs.values, state):
-            return inputs
+            return inputs, None
         with inputs.in_core():
             estimate = scene._model.field_sampling_error(state, load_parameters)
     if not is_suspect(estimate):
-        return inputs
+        return inputs, None
     positions = scene._model.positions(state)
     if any(field._in_magnets(positions).any() for field in map(inputs.values.current, scene.fields)):
-        return inputs  # the field has another formula inside of a magnet, and fine faces would not mend that
+        # the field has another formula inside of a magnet, and fine faces would not mend that
+        return inputs, None
     layout = scene._load_parameter_layout
-    errors = sampling_errors(
-        inputs.values,
-        positions,
-        float(layout.of(load_parameters, "scene", "field_factor")[0]),
-        layout.of(load_parameters, "scene", "applied_flux_density")[0],
+    errors = list(
+        sampling_errors(
+            inputs.values,
+            positions,
+            float(layout.of(load_parameters, "scene", "field_factor")[0]),
+            layout.of(load_parameters, "scene", "applied_flux_density")[0],
+        )
     )
     numbers = {}
     for each in errors:
@@ -105,7 +115,7 @@ def with_fine_faces(
         if len(more):
             numbers[each.label, KEY] = each.fine.astype(np.float64)
             numbers[each.label, KEY][more] = 1.0
-    return _with(inputs, numbers)
+    return _with(inputs, numbers), errors
 
 
 def _is_far(values: Values, state: np.ndarray) -> bool:

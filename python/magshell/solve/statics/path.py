@@ -25,7 +25,7 @@ from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import describe_strains
-from ...model.scene.field_sampling import is_suspect, warn_of_sampling
+from ...model.scene.field_sampling import is_suspect, sampling_errors, warn_of_sampling
 from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
 from ...model.scene.reshaped import reshaped, turning_supports
 from ...model.scene.scene import Scene
@@ -430,13 +430,13 @@ def _warn_of_fields(path: EquilibriumPath) -> None:
     errors = np.array([point.field_sampling_error for point in path._points])
     k = int(np.argmax(np.where(np.isnan(errors), np.inf, errors)))
     if is_suspect(errors[k]):
-        warn_of_sampling(
+        found = sampling_errors(
             path._values_at(k),
             path.positions[k],
             float(path._load_parameter("field_factor")[k, 0]),
             path._load_parameter("applied_flux_density")[k, 0],
-            f"the path, at point {k}, parameter {path.parameters[k]:.4g}",
         )
+        warn_of_sampling(found, f"the path, at point {k}, parameter {path.parameters[k]:.4g}")
 
 
 def _bending_energies(scene: Scene, found, load_parameters) -> list[float]:

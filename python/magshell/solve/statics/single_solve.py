@@ -19,8 +19,8 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.contact.watched_obstacles import watched_obstacles
-from ...model.scene.field_sampling import is_suspect, warn_of_sampling
-from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
+from ...model.scene.field_sampling import SamplingError, is_suspect, sampling_errors, warn_of_sampling
+from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces, with_fine_faces_and_errors
 from ...model.scene.replacements import requested
 from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
@@ -174,7 +174,7 @@ def solve(
         )
         if moving is not None and found.load_fraction < 1.0:
             inputs = inputs.with_values(moving.values(found.load_fraction))
-    found, inputs, stopped = _with_fine_faces_at_end(found, inputs, end, options, progress)
+    found, inputs, errors, stopped = _with_fine_faces_at_end(found, inputs, end, options, progress)
     with inputs.in_core():
         energies, arrays = _energies(scene, found), arrays_of(scene, found)
         strain = largest_of(scene, found.state, inputs.values.all_shells.thickness)
@@ -208,7 +208,9 @@ def solve(
     flux_density = layout.of(found.load_parameters, "scene", "applied_flux_density")[0]
     try:  # Ctrl-C may arrive in a field that is a Python function of the caller
         if is_suspect(found.field_sampling_error):
-            warn_of_sampling(inputs.values, positions, field_factor, flux_density, "this equilibrium")
+            if errors is None:
+                errors = sampling_errors(inputs.values, positions, field_factor, flux_density)
+            warn_of_sampling(errors, "this equilibrium")
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Solution(result, found, inputs)
@@ -220,20 +222,23 @@ def _with_fine_faces_at_end(
     to: np.ndarray,
     options: _core.StaticsOptions,
     progress: Callable[[float, float], None] | None,
-) -> tuple[_core.StaticsResult, Inputs, KeyboardInterrupt | None]:
+) -> tuple[_core.StaticsResult, Inputs, list[SamplingError] | None, KeyboardInterrupt | None]:
     """Repeat the search with more faces that sample the field finely, until the state needs no more.
 
-    Returns the result, the inputs, and the KeyboardInterrupt that was raised meanwhile, or None.
+    Returns the result, the inputs, the errors of sampling in the state that was found if they are known, and the
+    KeyboardInterrupt that was raised meanwhile, or None.
     """
     for _ in range(_MOST_REFINEMENTS):
         if found.outcome != _core.Outcome.converged:
             break
         try:
-            finer = with_fine_faces(inputs, found.state, found.load_parameters, found.field_sampling_error)
+            finer, errors = with_fine_faces_and_errors(
+                inputs, found.state, found.load_parameters, found.field_sampling_error
+            )
         except KeyboardInterrupt as stopped:
-            return found, inputs, stopped
+            return found, inputs, None, stopped
         if finer is inputs:
-            break
+            return found, inputs, errors, None
         options.start_at_rest = False
         with finer.in_core():
             again = _core.find_equilibrium(
@@ -248,7 +253,7 @@ def _with_fine_faces_at_end(
             )
         again.add_effort_of(found)
         found, inputs = again, finer
-    return found, inputs, None
+    return found, inputs, None, None
 
 
 def _energies(scene: Scene, found) -> dict[str, float] | None:
