@@ -94,7 +94,7 @@ def starts(x: np.ndarray) -> dict[str, np.ndarray]:
 BAD_STARTS = [
     f"{start}, {name}"
     for name in STABLE
-    for start in ("inverted", "flattened", "random")
+    for start in ("inverted", "flattened")
     if (start, name) != ("inverted", "Corotated")
 ]
 
@@ -106,6 +106,28 @@ def comes_back(which):
     x = solid.mesh.rest_positions
     found = ms.equilibrium(held(solid), start=starts(x)[start])
     return both(at_rest(found), near("positions", found.positions, x, rel=1e-6, scale=3.0))
+
+
+@case("started at random, {}: at rest or in another stable shape, all elements turned right", over=STABLE)
+def comes_to_rest(name):
+    """Check stability by a second solve, from the shape found and a push of a hundredth of the length.
+
+    Of sixty random starts some forty come back to rest, and the others end in shapes that bend the solid back on itself.
+    """
+    solid = bar((3, 1, 1), STABLE[name], "linear")
+    x = solid.mesh.rest_positions
+    draw = np.random.default_rng(3)
+    found = ms.equilibrium(held(solid), start=starts(x)["random"])
+    free = np.setdiff1d(np.arange(len(x)), ends(solid)[0])
+    pushed = found.positions.copy()
+    pushed[free] += draw.uniform(-0.03, 0.03, size=(len(free), 3))
+    again = ms.equilibrium(held(solid), start=pushed)
+    least = states_of(found.scene, solid, found._state).volume_ratios.min()
+    return both(
+        at_rest(found),
+        above("least J", least, 0.0),
+        near("positions after a push", again.positions, found.positions, rel=1e-6, scale=3.0),
+    )
 
 
 @case("started inverted, Corotated: crumpled at its support, all elements turned right")

@@ -54,7 +54,7 @@ COSTLY = {
     "hard saddles/strip magnetized against the field, 40",
     "hard slivers/far bent strip with a tinier face",
     "hard slivers/far bent strip with a face of nanometres",
-    "hard solids/comes back, random, Corotated",
+    "hard solids/comes to rest, Corotated",
     "hard solids/crumples",
     "hard starts/folded",
     "hard starts/inverted",

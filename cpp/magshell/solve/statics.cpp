@@ -19,20 +19,15 @@ namespace {
 constexpr double max_support_rotation = 0.5;
 // [-] Shortest load step in which obstacles may move, as a fraction of the load path; see
 // test_a_ball_that_moves_by_many_diameters_pushes_the_sheet_along.
-constexpr double min_clear_step = 1.0 / 4096.0;
-// [-] Number of times that a load step which ends beyond an obstacle is halved before the state is relaxed instead; see
-// test_a_ball_that_moves_by_many_diameters_pushes_the_sheet_along.
-constexpr int max_halvings = 6;
+constexpr double min_clear_step = negligible_part * negligible_part;
 
 // Moves links to where their joints lead them, for example after the origin of a motor has changed. No force would do that, since
 // motors hold in any position.
 void project_onto_joints(const Model& model, VectorXd& q) {
-    // [-] over the extent; see test_start_follows_the_changed_origin_of_a_motor
-    constexpr double round_off = 1e-13;
     VectorXd projected = q;
     model.dof_map().project_state(projected, nullptr);
-    const double off = (projected - q).head(model.n_coordinates()).lpNorm<Eigen::Infinity>();
-    if (off > round_off * model.extent()) q = std::move(projected);
+    if (largest_displacement(model, projected - q) > energy_tolerance * model.extent())
+        q = std::move(projected);
 }
 
 class Statics {
@@ -176,7 +171,7 @@ class Statics {
             newton_.model().set_angle_branches(result_.angle_branches);
             result_.reason = report.reason;
             result_.failed.shortest_step = std::min(result_.failed.shortest_step, step);
-            if (!through.empty() && ++halvings <= max_halvings) {
+            if (!through.empty() && ++halvings <= few) {
                 steps.reset_to(0.5 * step);
                 continue;
             }
@@ -230,7 +225,7 @@ class Statics {
         const Model& model = newton_.model();
         SolveStep step{.method = method, .negative_pivots = report.factor.negative_pivots};
         if (report.converged) {
-            step.displacement = (trial - result_.state).head(model.n_coordinates()).lpNorm<Eigen::Infinity>();
+            step.displacement = largest_displacement(model, trial - result_.state);
             step.energy = model.energy(trial, interpolate(from_, to_, target));
         } else {
             step.failure = report.reason;
@@ -260,13 +255,11 @@ class Statics {
     }
 
     bool find_other_equilibrium() {
-        // of the usual limit of iterations; see test_saddles_are_found_with_include_unstable
-        constexpr int iteration_factor = 3;
         load_parameters_at(1.0);
         VectorXd trial = result_.state;
         const NewtonReport report =
             solve_away_from(newton_, trial, to_, {options_.away_from, options_.away_length},
-                            iteration_factor * newton_.options().max_iterations);
+                            few / 2 * newton_.options().max_iterations);
         result_.reason = report.reason;
         record("deflated Newton", 1.0, trial, report);
         if (!report.converged) return false;
@@ -376,17 +369,23 @@ class Statics {
         newton_.evaluate(trial, result_.load_parameters, {});
         const double after = newton_.relative_residual(trial, {}, false);
         // Below the floor, round-off decides which residual is smaller; for a step this short the matrix is more reliable.
-        const bool tiny = p.head(newton_.model().n_coordinates()).lpNorm<Eigen::Infinity>() <=
-                          negligible_length * newton_.model().extent();
+        const bool tiny =
+            largest_displacement(newton_.model(), p) <= negligible_length * newton_.model().extent();
         if (!(after < before) &&
             !(tiny && newton_.relative_residual(trial, {}) <= newton_.options().tolerance))
             return;
+        const bool negligible = newton_.is_negligible(p);
+        if (!negligible && !judge(newton_.factorize_at(trial, result_.load_parameters))) {
+            // Round-off makes the matrix of a very thin sheet singular there; the state before has a regular one.
+            newton_.model().set_angle_branches(result_.angle_branches);
+            check_stability();
+            return;
+        }
         result_.state = trial;
-        result_.factor_is_exact = false;
+        result_.factor_is_exact = !negligible;
         result_.angle_branches = newton_.model().angle_branches();
         result_.residual = std::min(result_.residual, after);
         update_at_roundoff();
-        if (!newton_.is_negligible(p)) check_stability();
     }
 
     Newton& newton_;

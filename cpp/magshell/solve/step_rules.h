@@ -7,14 +7,10 @@
 namespace magshell {
 
 // Displacements over the extent of the bodies [-]: the longest last step of a converged Newton iteration, and its square, the error that is
-// left after it. Such an error changes an energy near its minimum by less than round-off; see test_fine_roof_takes_small_steps.
+// left after it. Such an error changes an energy near its minimum by its own square, which is round-off of a sum of energies. The cube is no
+// step any more. See test_fine_roof_takes_small_steps, test_hard_case_reaches_its_answer and test_strip_folds_onto_itself.
 constexpr double settled_step = 1e-3, hidden_part = settled_step * settled_step;
-constexpr double negligible_length = 1e-9;  // [-] shortest step length; see test_strip_folds_onto_itself
-// [-] Round-off of a sum of energies; see test_hard_case_reaches_its_answer.
-constexpr double energy_tolerance = 1e-12;
-// [-] Displacement over the extent below which a descent has settled: the Hessian then tells an equilibrium from a saddle. It is the shortest
-// step length of full Newton steps, too. See test_a_compressed_strip_leaves_the_saddle.
-constexpr double settled_part = 1e-4;
+constexpr double negligible_length = hidden_part * settled_step, energy_tolerance = hidden_part * hidden_part;
 
 // [-] Factor by which steps grow and shrink (trust regions, N&W 4.1). Its square limits changes that an estimate asks for, its cube serves
 // where there is none. See test_a_thin_strip_rolled_up and test_a_semi_cylinder_pulled_and_pushed.
@@ -24,7 +20,10 @@ constexpr double large_factor = step_factor * step_factor, largest_factor = larg
 // above which the model is good (N&W 4.1). See test_strip_folds_onto_itself and test_a_semi_cylinder_pulled_and_pushed.
 constexpr double progress_part = 1.0 / step_factor, good_part = 1.0 / large_factor;
 // Parts that are small beside the whole, and negligible. [-] See test_state_of_an_early_end_is_an_equilibrium.
-constexpr double small_part = 0.1, negligible_part = 0.01;
+constexpr double small_part = 1.0 / largest_factor, negligible_part = small_part * small_part;
+// [-] Displacement over the extent below which a descent has settled: the Hessian then tells an equilibrium from a saddle. It is the shortest
+// step length of full Newton steps, too. See test_a_compressed_strip_leaves_the_saddle.
+constexpr double settled_part = small_part * settled_step;
 
 // Largest number of trials, attempts or rounds of a method. See test_small_load_on_a_shallow_roof and test_hard_case_reaches_its_answer.
 constexpr int few = 8;

@@ -8,10 +8,6 @@
 namespace magshell {
 namespace {
 
-// [-] Rms distance from a known equilibrium, over the extent, below which a solution is taken for the same one; see
-// test_both_wells_of_a_bistable_beam.
-constexpr double same_distance = 1e-5;
-
 // The deflation operator M(q) of the header, with |.| the root mean square over the area of the bodies.
 class Deflation {
   public:
@@ -27,11 +23,9 @@ class Deflation {
             const double square = away.dot(q - each), scale = scale_ * scale_;
             if (square > 0.0) change -= 2.0 * scale * away.dot(step) / (square * (square + scale));
         }
-        // [-] Largest size of this factor; see test_both_wells_of_a_bistable_beam.
-        constexpr double max_step_factor = 10.0;
+        constexpr double most = large_factor * large_factor;  // see test_both_wells_of_a_bistable_beam
         const double factor = 1.0 / (1.0 - change);
-        return std::isfinite(factor) ? std::clamp(factor, -max_step_factor, max_step_factor)
-                                     : max_step_factor;
+        return std::isfinite(factor) ? std::clamp(factor, -most, most) : most;
     }
 
     // Returns true if a known equilibrium is at most this rms distance [m] away.
@@ -59,7 +53,7 @@ class DeflatedSteps final : public NewtonIteration {
     bool is_done() override {
         if (report_.residual > newton_.options().tolerance || last_step_ > settled_step * model_.extent())
             return false;
-        report_.converged = !deflation_.is_known(q_, same_distance * model_.extent());
+        report_.converged = !deflation_.is_known(q_, settled_part * model_.extent());
         if (!report_.converged) fail("the search converged to an equilibrium that is known");
         return true;
     }

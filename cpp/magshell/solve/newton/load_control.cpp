@@ -6,10 +6,10 @@
 
 namespace magshell {
 double LoadStepController::propose(double left) {
-    // [-] Stretch of a step that ends the path rather than leaving a short rest; see test_a_thin_strip_rolled_up.
-    constexpr double max_stretch = 1.3;
     step_ = std::min(step_, longest_);
-    return max_stretch * step_ >= left && left <= longest_ ? left : std::min(step_, left);
+    // A rest of the path that would be short joins the step before it.
+    const bool ends = left - step_ <= good_part * step_ && left <= longest_;
+    return ends ? left : std::min(step_, left);
 }
 
 void LoadStepController::accept(double step, const NewtonReport& report) {
@@ -28,9 +28,7 @@ void LoadStepController::accept(double step, const NewtonReport& report) {
 }
 
 bool LoadStepController::is_short(const NewtonReport& report) const {
-    // [-] over the extent; see test_a_semi_cylinder_pulled_and_pushed
-    constexpr double short_length = 0.05;
-    return length_of(report) < short_length;
+    return length_of(report) < good_part * good_part;
 }
 
 bool LoadStepController::reject(double step, const NewtonReport& report) {
@@ -40,7 +38,7 @@ bool LoadStepController::reject(double step, const NewtonReport& report) {
         const double length = failed_length_ = length_of(report);
         const double good_step = good_part / std::max(length, negligible_length) * step;
         // On a load path that moves the scene by many extents, even a small fraction may be a long step.
-        if (!fixed_) smallest_ = std::max(std::min(smallest_, good_step / largest_factor), hidden_part);
+        if (!fixed_) smallest_ = std::max(std::min(smallest_, small_part * good_step), hidden_part);
         if (length > progress_part * good_part && step > smallest_)
             step_ = std::max(std::min(step_, good_step), smallest_);
     }

@@ -27,9 +27,6 @@ double relative(const VectorXd& contact_alpha, const VectorXd& magnitude, const 
     return scale > 0.0 ? length / scale : length > 0.0 ? 1.0 : 0.0;
 }
 
-// [-] Displacement over the thickness up to which a factorization stays valid; see test_going_on_gives_the_same_bits.
-constexpr double negligible_move = 1e-7;
-
 // Relative residual and number of vectors of GMRES for gradients with a nearby factorization: the solution of a soft shell has up to
 // four digits less than its residual. See test_over_200_steps_against_differences.
 constexpr double nearby_gradient_tolerance = 1e-14;  // [-] see test_over_200_steps_against_differences
@@ -127,9 +124,6 @@ double Newton::apply_increment(VectorXd& q, VectorXd& step, double shortest, New
 // is bracketed and found by regula falsi (Illinois variant).
 double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, double alpha,
                                    double slope) const {
-    constexpr int max_trials = 6;  // see test_strip_folds_onto_itself
-    // [-] Remaining slope below which a longer step is not tried; see test_block_on_a_slope_sticks_or_slides.
-    constexpr double remaining_slope = 0.2;
     if (!(slope > 0.0)) return 1.0;
     const Contacts& contact = model_.contacts();
     const auto pushed_back = [&](double alpha_contact) {
@@ -143,10 +137,10 @@ double Newton::contact_step_length(const VectorXd& q, const VectorXd& step, doub
                alpha_contact * stiffness;
     };
     Bracket ends{0.0, -slope, 1.0, slope_at(1.0)};
-    while (alpha == 1.0 && ends.at_upper < -remaining_slope * slope && ends.upper < largest_factor)
+    while (alpha == 1.0 && ends.at_upper < -good_part * slope && ends.upper < largest_factor)
         ends = {ends.upper, ends.at_upper, step_factor * ends.upper, slope_at(step_factor * ends.upper)};
     if (ends.at_upper <= progress_part * slope) return ends.upper;
-    for (int trial = 0; trial < max_trials; ++trial) {
+    for (int trial = 0; trial < few; ++trial) {
         // Contact forces grow faster than linearly, so a secant falls short; the Illinois rule halves the slope of the end that stays.
         const double alpha_contact = ends.secant_zero(small_part), there = slope_at(alpha_contact);
         if (there > progress_part * slope)
@@ -168,7 +162,6 @@ void Newton::describe_contact(NewtonReport& report) const {
 
 double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
                            const VectorXd& from, const VectorXd& step, double slope, double longest) {
-    constexpr int max_trials = 12;  // see test_strip_folds_onto_itself
     const auto slope_here = [&] { return gradient(q, proximal).dot(step); };
     const auto slope_at = [&](double length) {
         q = from;
@@ -178,13 +171,13 @@ double Newton::line_search(VectorXd& q, const LoadParameters& load_parameters, c
     };
     double alpha_contact = 1.0;
     Bracket ends{0.0, -slope, 1.0, slope_here()};
-    while (ends.at_upper < -progress_part * slope && 2.0 * ends.upper <= longest) {
-        const double ahead = 2.0 * ends.upper;
+    while (ends.at_upper < -progress_part * slope && step_factor * ends.upper <= longest) {
+        const double ahead = step_factor * ends.upper;
         if (model_.capabilities().admissible_step_length(from, ahead * step) < 1.0) return ends.upper;
         ends = {ends.upper, ends.at_upper, ahead, slope_at(ahead)};
     }
     if (ends.at_upper <= progress_part * slope) return ends.upper;
-    for (int trial = 0; trial < max_trials; ++trial) {
+    for (int trial = 0; trial < few; ++trial) {
         // The contact force grows faster than linearly: the Illinois rule halves the slope of the end that stays.
         alpha_contact = ends.secant_zero(small_part);
         const double there = slope_at(alpha_contact);
@@ -204,7 +197,7 @@ bool Newton::is_equilibrium(const VectorXd& q, const LoadParameters& load_parame
 }
 
 bool Newton::is_negligible(double displacement) const {
-    return displacement <= negligible_move * model_.length_scale();
+    return displacement <= small_part * hidden_part * model_.length_scale();
 }
 
 bool Newton::is_negligible(const VectorXd& step) const {

@@ -35,17 +35,8 @@ bool NewtonIteration::begin() {
 
 namespace {
 
-// [-] Last step below the floor of round-off, over the extent; see test_fine_roof_takes_small_steps.
-constexpr double last_under_floor = 1e-5;
-// New negative pivots above which a shell has diverged (a solid that a first step overstretches has many more for one iteration); see
-// test_a_flat_strip_far_beyond_where_it_buckles.
-constexpr Index most_new_negative_pivots = 10;
-// [-] Ratio of steps below which an iteration may pass an unstable state (in-plane corrections do); see test_a_semi_cylinder_pulled_and_pushed.
-constexpr double settling_ratio = 0.3;
 // Iteration from which on steps must shrink; see test_a_thin_strip_rolled_up.
 constexpr int settling_iterations = 6;
-// [-] Length of a step with a projected matrix in a time stage, over Newton's; see test_a_stage_with_contact_wastes_few_factorizations.
-constexpr double longest_projected_step = 1024.0;
 
 // Returns the tolerance of the linear solve with a nonsymmetric matrix (inexact Newton, N&W 7.1): the forcing term that keeps quadratic
 // convergence, and no less than the tolerance of the residual needs.
@@ -94,7 +85,7 @@ class FullSteps final : public NewtonIteration {
         const bool settled = report_.residual <= tolerance_ && last_step_ <= settled_step * model_.extent();
         // Below the floor of round-off, small forces that move a thin shell far vanish in larger ones: the last step decides.
         if (in_place_ && settled &&
-            ((report_.iterations > 0 && last_step_ <= last_under_floor * model_.extent()) ||
+            ((report_.iterations > 0 && last_step_ <= hidden_part * model_.extent()) ||
              newton_.relative_residual(q_, proximal_, false) <= tolerance_)) {
             report_.converged = true;
             report_.factor_is_current = newton_.is_negligible(moved_);
@@ -109,7 +100,7 @@ class FullSteps final : public NewtonIteration {
     // Quadratic convergence predicts the remaining displacement. It must be small compared with the thickness, as it stretches the shell.
     bool may_end_inexactly() const {
         return policy_.inexact && in_place_ && report_.iterations > 1 &&
-               last_step_ <= settling_ratio * step_before_ &&
+               last_step_ <= good_part * step_before_ &&
                last_step_ * last_step_ * last_step_ <=
                    std::min(settled_step * report_.first_length, small_part * model_.length_scale()) *
                        step_before_ * step_before_ &&
@@ -145,8 +136,9 @@ class FullSteps final : public NewtonIteration {
         if (!report_.factor.succeeded) return false;
         const Index negative_pivots = report_.factor.negative_pivots;
         if (report_.iterations == 0) first_negative_pivots_ = negative_pivots;
+        // A solid that a first step overstretches has many more for one iteration.
         report_.diverged = !model_.capabilities().has_transient_instability &&
-                           negative_pivots > first_negative_pivots_ + most_new_negative_pivots;
+                           negative_pivots > first_negative_pivots_ + few;
         if (mixed_ && report_.diverged) return fail("the Newton iteration diverged");
         // The pivots of a projected matrix say nothing about stability. The errors of extrapolated stresses are the square of a step over
         // the thickness.
@@ -230,8 +222,9 @@ class FullSteps final : public NewtonIteration {
     // Takes note of the length of a step [m]. Returns false, with a reason in the report, if the iteration should stop after it.
     bool is_useful(double length) {
         if (report_.iterations == 0) report_.first_length = length;
+        // Steps that settle may pass an unstable state, as corrections in the plane of a shell do.
         if (policy_.stop_on_instability && report_.iterations > 0 &&
-            length > std::max(settling_ratio * last_step_, settled_step * model_.extent()) &&
+            length > std::max(good_part * last_step_, settled_step * model_.extent()) &&
             (report_.factor.negative_pivots > first_negative_pivots_ ||
              (report_.iterations == 1 && length > large_factor * std::max(last_step_, model_.extent()))))
             return fail("the iteration leaves the stable states");
@@ -301,8 +294,9 @@ class SearchedSteps final : public NewtonIteration {
         // Near a saddle of the energy a projected matrix is far stiffer than the exact one, and its steps are too short.
         const bool may_lengthen = project_psd && proximal_.motion && alpha_ == 1.0;
         if (in_place)
-            alpha_ *= newton_.line_search(q_, load_parameters_, proximal_, from, step, alpha_ * slope,
-                                          may_lengthen ? longest_projected_step : 1.0);
+            alpha_ *= newton_.line_search(
+                q_, load_parameters_, proximal_, from, step, alpha_ * slope,
+                may_lengthen ? model_.extent() / largest_displacement(model_, step) : 1.0);
         return true;
     }
 
@@ -321,7 +315,6 @@ NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, c
     FullSteps full(*this, q, load_parameters, policy, max_iterations);
     NewtonReport report = full.run();
     if (!may_search || report.converged || !report.had_contact) return report;
-    constexpr int searched = 5;  // times max_iterations; see test_strip_folds_onto_itself
     const int iterations = report.iterations;
     // If a step was blocked, or a time stage came closer to its solution, the line search continues from there; otherwise the iteration
     // may have led anywhere and starts again.
@@ -333,7 +326,7 @@ NewtonReport Newton::solve(VectorXd& q, const LoadParameters& load_parameters, c
         q = from;
         model_.set_angle_branches(angle_branches);
     }
-    report = SearchedSteps(*this, q, load_parameters, policy.proximal, searched * max_iterations).run();
+    report = SearchedSteps(*this, q, load_parameters, policy.proximal, few * max_iterations).run();
     report.iterations += iterations;
     if (!report.converged) describe_contact(report);
     return report;

@@ -1,14 +1,15 @@
 #include "magshell/solve/newton/unsymmetric.h"
 
+#include "magshell/solve/step_rules.h"
+
 namespace magshell {
 
 GmresReport solve_unsymmetric(const Model& model, const Factor& factor, bool transposed,
                               const GmresOptions& options, VectorXd& reduced) {
     const DofMap& dof_map = model.dof_map();
     // Multiplying a preconditioned vector by the symmetric part returns it up to the round-off of the factorization. The product is
-    // therefore computed only for tight tolerances. [-] See test_methods_of_second_order_stick.
-    constexpr double coarse = 1e-10;  // [-] see test_methods_of_second_order_stick
-    const bool known = options.tolerance > coarse;
+    // therefore computed only for tight tolerances; see test_methods_of_second_order_stick.
+    const bool known = options.tolerance > small_part * negligible_length;
     VectorXd before;
     const auto assembled = [&](const VectorXd& x) {
         VectorXd rest = VectorXd::Zero(model.size());
