@@ -175,6 +175,19 @@ def test_reactions_balance_loads_and_weight(tmp_path) -> None:
         assert set(held) == {*MESH.vertices_at(x=0.0), *MESH.vertices_at(x=0.05)}
 
 
+def test_loads_of_a_solve_replace_those_of_the_scene(tmp_path) -> None:
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    load = ms.PointLoad(MESH.vertices_at(x=0.05), (0, 0, 1e-5))
+    scene = ms.Scene(sheet, supports=ms.Clamp(MESH.edges_at(x=0.0)), loads=load)
+    given = np.zeros((MESH.n_vertices, 3))
+    given[-1, 2] = 5e-5
+    rest = ms.equilibrium(scene, vertex_loads=given, load_factor=0.5)
+    (file,) = listed(ms.write_series(tmp_path / "own.pvd", ms.EquilibriumSet([rest]))).values()
+    on_vertices, _ = ms.read_fields(tmp_path / file)
+    assert on_vertices["load"] == pytest.approx(0.5 * given, abs=1e-16)
+    assert on_vertices["reaction"][:, 2].sum() == pytest.approx(-2.5e-5, rel=1e-6)
+
+
 def test_reactions_of_a_motion_are_those_of_its_result(move, tmp_path) -> None:
     file = list(listed(ms.write_series(tmp_path / "strip.pvd", move)).values())[3]
     on_vertices, _ = ms.read_fields(tmp_path / file)

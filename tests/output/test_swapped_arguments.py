@@ -34,6 +34,19 @@ def test_a_path_that_comes_second_is_told(tmp_path):
             write(what, str(tmp_path / name))
 
 
+def test_arguments_without_a_name_are_told():
+    with pytest.raises(
+        TypeError, match=r"plot takes what without a name, got 'a\.png' too.*\.save\('a\.png'\)"
+    ):
+        ms.plot(MESH, "a.png")
+    with pytest.raises(TypeError, match=r"plot takes what without a name.*\.save\("):
+        at_rest().plot("a.png")
+    with pytest.raises(
+        TypeError, match=r"Shell takes mesh without a name, got 0\.001 too: name it, as in thickness="
+    ):
+        ms.Shell(MESH, 1e-3, 1e6)
+
+
 def test_loads_say_what_they_act_on():
     assert repr(ms.PointLoad([0, 1], (0, 0, 1))) == "PointLoad(2 vertices)"
     assert repr(ms.EdgeLoad(np.array([True, False, True]), (0, 0, 1))) == "EdgeLoad(2 edges)"

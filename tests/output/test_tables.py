@@ -55,6 +55,17 @@ def test_pandas_has_times_and_vertices(results):
     assert ms.to_pandas(results["path"]).index.name == "parameter"
 
 
+def test_scenes_with_loads_have_a_column_of_the_load_factor(results):
+    pytest.importorskip("pandas")
+    load = ms.PointLoad(MESH.vertices_at(x=0.05), (0, 0, 1e-5))
+    scene = ms.Scene(SCENE.bodies[0], supports=SCENE.supports, loads=load)
+    name, factors = "load_factor [1]", [0.2, 0.5, 1.0]
+    assert ms.to_pandas(ms.equilibrium(scene, load_factor=factors))[name].tolist() == factors
+    move = ms.simulate(scene, steps=2, time_step=1e-3, load_factor=factors)
+    assert ms.to_pandas(move)[name].tolist() == factors
+    assert name not in ms.to_pandas(results["move"])
+
+
 def test_tensors_become_arrays_in_tables(results):
     torch = pytest.importorskip("torch")
     pytest.importorskip("xarray")

@@ -90,6 +90,13 @@ def to_array(name: str, value: Any):
     return detached(value)
 
 
+def as_operand(values: Any, other: Any) -> Any:
+    """Return numbers or a tensor such that formulas can combine them with `other`: as a tensor if it is one."""
+    if is_tensor(values):
+        return values.to(other) if is_tensor(other) else values
+    return other.new_tensor(np.array(values)) if is_tensor(other) else values
+
+
 def like(values: np.ndarray, *inputs):
     """Return the array, as a tensor if one of the inputs is a tensor."""
     if not any(is_tensor(given) for given in inputs):

@@ -30,9 +30,9 @@ def call_registered(name: str, *arguments: Any) -> Any:
 class PlotMixin(Frozen):
     """A mixin for objects that ms.plot can draw."""
 
-    def plot(self, **options: Any) -> Any:
-        """Draw a picture: ms.plot(self, ...), with the keywords of ms.plot."""
-        return _FUNCTIONS["plot"](self, **options)
+    def plot(self, *unnamed: Any, **options: Any) -> Any:
+        """Draw a picture: ms.plot(self, ...), with the keywords of ms.plot, which refuses arguments without a name."""
+        return _FUNCTIONS["plot"](self, *unnamed, **options)
 
 
 class SaveMixin(PlotMixin):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import os
 import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -13,6 +14,7 @@ from .keywords import as_keywords, check_known
 from .solve_keywords import with_keywords
 
 F = TypeVar("F", bound=Callable)
+_NAMED = inspect.Parameter.KEYWORD_ONLY
 
 
 def grouped(**groups: type[Any]) -> Callable[[F], F]:
@@ -28,15 +30,30 @@ def grouped(**groups: type[Any]) -> Callable[[F], F]:
             return function  # it checks its keywords itself
         known = tuple(parameters)
         name = function.__qualname__.removesuffix(".__init__")
+        kinds = [each.kind for each in parameters.values()]
+        most = sys.maxsize if inspect.Parameter.VAR_POSITIONAL in kinds else len(kinds) - kinds.count(_NAMED)
 
         @functools.wraps(function)
         def called(*arguments, **named):
             check_known(name, named, known, groups)
+            if len(arguments) > most:
+                raise TypeError(_without_name(name, known, most, arguments[most]))
             return function(*arguments, **named)
 
         return called
 
     return decorated
+
+
+def _without_name(name: str, known: tuple[str, ...], most: int, value: Any) -> str:
+    """Return the message for an argument that needs a name. most: the number of those that need none."""
+    alone = [each for each in known[:most] if each != "self"]
+    takes = f"takes {' and '.join(alone)} without a name" if alone else "takes no argument without a name"
+    told = f"{name} {takes}, got {value!r:.40} too"
+    told += f": name it, as in {known[most]}=" if most < len(known) else ""
+    if name == "plot" and isinstance(value, str | os.PathLike):
+        return f"{told}. A picture is saved by ms.plot(...).save({str(value)!r})"
+    return told
 
 
 def solve_entry(function: F) -> F:

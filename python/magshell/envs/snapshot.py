@@ -113,8 +113,15 @@ class Snapshot:
     def _load_factors(self) -> np.ndarray:
         return self.motion._load_factors[self.index]
 
+    @property
+    def _rest(self) -> Any:
+        return self.motion._rest
+
     def _values_at(self, index: int):
         return self.motion._values_at(self.index)
+
+    def _tensors_at(self, index: int) -> dict[tuple[Any, str], Any]:
+        return self.motion._tensors_at(self.index)
 
     def _state_at(self, index: int) -> np.ndarray:
         return self.motion._state_at(self.index)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._input.tensors import stacked
+from ..._input.given_values import as_given, load_factor_of, rest_tensor_of
+from ..._input.tensors import as_operand, stacked
 from ..._runtime.frozen import Frozen
 from .closed_surface import of_tetrahedra
 
@@ -33,14 +34,21 @@ class ActuatorResult(Frozen):
         """Return law(actuator, value, load factor) for the values of all states, with the actuator as it was in each
         state.
         """
-        factors = self._result._load_factors
-        if np.ndim(factors) == 0:
-            return law(self._at(0), states, float(factors))
-        return stacked([law(self._at(k), states[k], float(factor)) for k, factor in enumerate(factors)])
+        result = self._result
+        if np.ndim(result._load_factors) == 0:
+            return law(self._at(0), states, load_factor_of(result, 0))
+        count = len(result._load_factors)
+        return stacked([law(self._at(k), states[k], load_factor_of(result, k)) for k in range(count)])
 
     def _at(self, k: int):
-        """Return the actuator as it was in a state."""
-        return self._result._values_at(k).current(self.actuator)
+        """Return the actuator as it was in a state, with tensors for the values that were given so."""
+        return as_given(self._result, self.actuator, k)
+
+    @property
+    def _rest_positions(self) -> Computed:
+        """The rest positions of the scene, (n_v, 3) m; a tensor if the solve was given them so."""
+        given = rest_tensor_of(self._result)
+        return self._result.scene.mesh.rest_positions if given is None else given
 
     def __repr__(self) -> str:
         return f"{type(self._result).__name__} of {self.actuator!r}"
@@ -57,7 +65,7 @@ class CavityResult(ActuatorResult):
     @property
     def pressure(self) -> Computed:
         """The pressure relative to the outside, under the load factor, (...) Pa."""
-        rest = float(self._surface.volume(self._result.scene.mesh.rest_positions))
+        rest = self._surface.volume(self._rest_positions)
         return self._by_law(
             lambda cavity, volume, factor: cavity._pressure_at(volume, rest, factor), self.volume
         )
@@ -75,11 +83,11 @@ class CellsResult(ActuatorResult):
         """The volume of each cell over its rest volume J, (..., k)."""
         span = self._result.scene._bodies.of(self.actuator)
         positions = self._result.positions[..., span.vertices, :]
-        mesh = self.actuator.body.mesh
+        rest = as_operand(self._rest_positions, positions)[span.vertices]
         volumes = []
         for group in self.actuator.groups:
-            surface = of_tetrahedra(mesh.tetrahedra[group])
-            volumes.append(surface.volume(positions) / float(surface.volume(mesh.rest_positions)))
+            surface = of_tetrahedra(self.actuator.body.mesh.tetrahedra[group])
+            volumes.append(surface.volume(positions) / surface.volume(rest))
         return stacked(volumes, axis=-1)
 
     @property
@@ -103,8 +111,23 @@ class TendonResult(ActuatorResult):
         for at, weights in self.actuator._embedded(scene._bodies, scene._rigid):
             of_points = at[0] >= n_vertices
             rows = own[..., at - n_vertices, :] if of_points else vertices[..., at, :]
-            points.append((rows * _like(weights[:, None], rows)).sum(-2))
+            points.append((rows * as_operand(weights[:, None], rows)).sum(-2))
         return stacked(points, axis=-2)
+
+    def _at(self, k: int):
+        """Return the tendon as it was in a state; what follows from its length at rest follows the rest positions."""
+        now, rest = super()._at(k), rest_tensor_of(self._result)
+        if rest is None:
+            return now
+        scene = self._result.scene
+        embedded = self.actuator._embedded(scene._bodies, scene._rigid)
+        points = [
+            as_operand(np.array(point), rest)
+            if at[0] >= len(scene._bodies.original)
+            else (rest[at] * as_operand(weights[:, None], rest)).sum(0)
+            for (at, weights), point in zip(embedded, self.actuator.points, strict=True)
+        ]
+        return now._of_lengths(((stacked(points)[1:] - stacked(points)[:-1]) ** 2).sum(-1) ** 0.5)
 
     @property
     def lengths(self) -> Computed:
@@ -126,7 +149,3 @@ class TendonResult(ActuatorResult):
             lambda tendon, length, factor: factor * tendon._tension_at(length),
             self.length if self.actuator.sliding else self.lengths,
         )
-
-
-def _like(array: np.ndarray, other):
-    return array if isinstance(other, np.ndarray) else other.new_tensor(array)

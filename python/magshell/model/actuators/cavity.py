@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..._input.selections import indices, selection
+from ..._input.tensors import as_operand
 from ..bodies.bodies import BODIES, Bodies, on_body
 from ..shells.shell import Shell
 from ..solids.solid import Solid
@@ -147,14 +148,18 @@ class Cavity(Actuator):
             return 0.0
         return abs(self.volume / self.rest_volume(scene) - 1.0)
 
-    def _pressure_at(self, volume: Numbers, rest_volume: float, load_factor: float) -> Computed:
-        """Return the pressure relative to the outside at a volume [m3], Pa."""
+    def _pressure_at(self, volume: Computed, rest_volume: Computed, load_factor: Computed) -> Computed:
+        """Return the pressure relative to the outside at a volume [m3], Pa. The values of the fluid may be tensors."""
+        rest, now = (
+            as_operand(rest_volume, volume),
+            {name: as_operand(getattr(self, name), volume) for name in _LAWS[self.law]},
+        )
         if self.law == "pressure":
-            return load_factor * self.pressure + 0.0 * volume
+            return load_factor * now["pressure"] + 0.0 * volume
         if self.law == "gas":
-            return load_factor * (self.gas_pressure * rest_volume / volume - self.outside_pressure)
-        target = rest_volume + load_factor * (self.volume - rest_volume)
-        return -self.bulk_modulus * (volume - target) / rest_volume
+            return load_factor * (now["gas_pressure"] * rest / volume - now["outside_pressure"])
+        target = rest + load_factor * (now["volume"] - rest)
+        return -now["bulk_modulus"] * (volume - target) / rest
 
     def _core_input(self, label: str, bodies: Bodies) -> dict[Any, Any]:
         return {

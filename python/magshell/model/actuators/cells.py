@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..._input.selections import indices, selection
+from ..._input.tensors import as_operand
 from ..bodies.bodies import Bodies, on_body
 from ..solids.solid import Solid
 from .actuator import Actuator, numbers
@@ -83,12 +84,10 @@ class PneumaticCells(Actuator):
     def _filling(self, scene: Scene) -> float:
         return float(np.abs(np.asarray(self.volume_ratio) - 1.0).max(initial=0.0))
 
-    def _pressure_at(self, ratios: Numbers, load_factor: float) -> Computed:
-        """Return the pressures at volume ratios (k,), (k,) Pa."""
-        target = 1.0 + load_factor * (self.volume_ratio - 1.0)
-        if isinstance(ratios, np.ndarray):
-            return self.stiffness * (target - ratios)
-        return ratios.new_tensor(self.stiffness) * (ratios.new_tensor(target) - ratios)
+    def _pressure_at(self, ratios: Computed, load_factor: Computed) -> Computed:
+        """Return the pressures at volume ratios (k,), (k,) Pa. The values of the cells may be tensors."""
+        target = 1.0 + load_factor * (as_operand(self.volume_ratio, ratios) - 1.0)
+        return as_operand(self.stiffness, ratios) * (target - ratios)
 
     def _core_input(self, label: str, bodies: Bodies) -> dict[Any, Any]:
         of_scene = bodies.original[bodies.of(self).vertices]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..._input.quantity import quantity
+from ..._input.tensors import as_operand
 from ..._runtime.frozen import variant
 from ..bodies.bodies import BODIES, Bodies, on_body
 from ..bodies.embedded_points import embed_points, embedded_in, moved_with
@@ -134,10 +135,15 @@ class Tendon(Actuator):
         ]
         bodies = tuple(now.get(id(body), body) for body in self.bodies)
         found = variant(self, _points=points, bodies=bodies)
-        lengths = found._lengths
-        length = float(lengths.sum())
-        own = {name: number(name, "m", _OF_LENGTH[name] * length, 0.0, above=True) for name in self._follows}
-        return variant(found, _fractions=lengths / length, **own)
+        return found._of_lengths(found._lengths)
+
+    def _of_lengths(self, lengths: Computed) -> Tendon:
+        """Return the tendon with the values that follow from the lengths of its segments at rest, (segments,) m."""
+        length = lengths.sum()
+        own = {name: _OF_LENGTH[name] * length for name in self._follows}
+        if isinstance(lengths, np.ndarray):
+            own = {name: number(name, "m", value, 0.0, above=True) for name, value in own.items()}
+        return variant(self, _fractions=lengths / length, **own)
 
     def _by_rest_positions(self, body: Shell | Solid, label: str, gradient: Gradient) -> np.ndarray:
         """Return the gradient by the rest positions of a body, (n_v, 3), through the values that follow from the length."""
@@ -153,16 +159,23 @@ class Tendon(Actuator):
                 np.add.at(found, vertices, weights[:, None] * by)
         return found
 
-    def _tension_at(self, length: Numbers) -> Computed:
-        """Return the tension at a length [m], N; of a tendon that does not slide, for all segments, (..., segments)."""
-        fractions = 1.0 if self.sliding else _like(self._fractions, length)
-        beyond = length - fractions * float(self.rest_length)
-        smoothing = fractions * float(self.smoothing)
+    def _tension_at(self, length: Computed) -> Computed:
+        """Return the tension at a length [m], N; of a tendon that does not slide, for all segments, (..., segments).
+
+        Its values may be tensors.
+        """
+        fractions = 1.0 if self.sliding else as_operand(self._fractions, length)
+        tension, stiffness, rest_length, smooth = (
+            as_operand(getattr(self, name), length)
+            for name in ("tension", "stiffness", "rest_length", "smoothing")
+        )
+        beyond = length - fractions * rest_length
+        smoothing = fractions * smooth
         below = 0.5 * beyond**2 / smoothing
         pull = (beyond - 0.5 * smoothing) * (beyond >= smoothing) + below * (
             (beyond > 0.0) & (beyond < smoothing)
         )
-        return float(self.tension) + float(self.stiffness) / fractions * pull
+        return tension + stiffness / fractions * pull
 
     def _embedded(
         self, scene_bodies: Bodies, rigid_points: Sequence[RigidBodyPoints]
@@ -208,7 +221,3 @@ def _points(points, body) -> list[tuple[Shell | Solid | RigidBody, np.ndarray]]:
 
 def _is_pair(each) -> bool:
     return isinstance(each, list | tuple) and len(each) == 2 and isinstance(each[0], _KINDS)
-
-
-def _like(array: np.ndarray, other):
-    return other.new_tensor(array) if hasattr(other, "new_tensor") else array

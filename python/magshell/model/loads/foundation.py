@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.selections import indices, selection
+from ..._input.tensors import as_operand
 from ..bodies.bodies import Bodies, checked_body, on_body
 from ..shells.shell import Shell
 from ..solids.solid import Solid
-from .springs import Springs, SpringsResult, axes, like, numbers_of_springs, scene_vertices, unit_vector
+from .springs import Springs, SpringsResult, axes, numbers_of_springs, scene_vertices, unit_vector
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed, Numbers, SolveResult
@@ -157,7 +158,7 @@ class FoundationResult(SpringsResult):
         vertices, areas, numbers, normals = self._springs._lumped(self._span.mesh)
         at = np.arange(len(self._result.scene._bodies.original))[self._span.vertices][vertices]
         positions = self._result.positions[..., at, :]
-        moved = positions - like(self._span.mesh.rest_positions[vertices], positions)
+        moved = positions - as_operand(self._span.mesh.rest_positions[vertices], positions)
         velocities = self._velocities()
         rates = 0.0 * moved if velocities is None else velocities[..., at, :]
         row_of = np.unique(vertices, return_inverse=True)[1]
@@ -178,16 +179,16 @@ class FoundationResult(SpringsResult):
 def _forces(bed: ElasticFoundation, moved: Any, rates: Any, areas: Any, numbers: Any, normals: Any) -> Any:
     """Return the forces of springs whose ends moved, (m, 3) N."""
 
-    def each(value: np.ndarray) -> Any:
-        of_springs = value[numbers] if value.ndim else value
-        return like((areas * of_springs)[:, None], moved)
+    def each(value: Any) -> Any:
+        of_springs = as_operand(value[numbers] if value.ndim else value, moved)
+        return (as_operand(areas, moved) * of_springs)[:, None]
 
     found = -each(bed.stiffness) * moved
     if bed.damping is not None:
         found = found - each(bed.damping) * rates
     if bed.direction is None:
         return found
-    along = like(normals if isinstance(bed.direction, str) else bed.direction, moved)
+    along = as_operand(normals if isinstance(bed.direction, str) else bed.direction, moved)
     return (found * along).sum(-1)[:, None] * along
 
 

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.given_values import rest_tensor_of
 from ..._input.quantity import quantity, real_numbers
-from ..._input.tensors import stacked
+from ..._input.tensors import as_operand, stacked
 from ..._runtime.frozen import variant
 from ..bodies.bodies import BODIES, Bodies
 from ..bodies.embedded_points import embed_points, embedded_in, moved_with
 from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
-from .springs import Springs, SpringsResult, axes, like, numbers_of_springs, unit_vector
+from .springs import Springs, SpringsResult, axes, numbers_of_springs, unit_vector
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -299,6 +300,24 @@ class SpringResult(SpringsResult):
         """The forces on the ends a, with those of their dampers in motions, (..., n, 3) N."""
         return self._shaped(self._in_each_state(_forces, *self._motion()), 1)
 
+    def _at(self, k: int) -> Any:
+        """Return the springs as they were in a state; what follows from their ends at rest follows the rest positions."""
+        now, rest = super()._at(k), rest_tensor_of(self._result)
+        if rest is None or not now._follows:
+            return now
+        ends = [self._ends_at_rest(end, rest) for end in range(2)]
+        lengths = ((ends[1] - ends[0]) ** 2).sum(-1) ** 0.5
+        of_all = {"rest_length": lengths, "ground": ends[0]}
+        return variant(now, **{name: of_all[name][0] if now._one else of_all[name] for name in now._follows})
+
+    def _ends_at_rest(self, end: int, rest: Any) -> Any:
+        """Return the ends 0 or 1 at rest positions that are a tensor, (n, 3) m; those on rigid bodies do not move."""
+        scene, springs = self._result.scene, self._springs
+        if not isinstance(springs._of[end], BODIES):
+            return as_operand(springs._ends[end], rest)
+        embedded = springs._embedded_end(end, scene._bodies, scene._rigid)
+        return stacked([(rest[at] * as_operand(weights[:, None], rest)).sum(0) for at, weights in embedded])
+
     def _require_axial(self, name: str) -> None:
         if not self._springs._is_axial:
             raise ValueError(f"{self._springs!r} acts along axes, so it has no {name}: use .force")
@@ -330,12 +349,12 @@ class SpringResult(SpringsResult):
         total = 0.0
         if not on_rigid.all():
             rows = of_vertices[..., np.where(on_rigid, 0, nodes), :]
-            total = (rows * like(weights * ~on_rigid[..., None], of_vertices)).sum(-2)
+            total = (rows * as_operand(weights * ~on_rigid[..., None], of_vertices)).sum(-2)
         if not on_rigid.any():
             return total
         points = getattr(self._result, own)
         rows = points[..., np.where(on_rigid, nodes - n_v, 0), :]
-        return total + (rows * like(weights * on_rigid[..., None], points)).sum(-2)
+        return total + (rows * as_operand(weights * on_rigid[..., None], points)).sum(-2)
 
     def _shaped(self, found: Any, axes: int) -> Computed:
         """Return numbers of all springs, or those of the only one without their axis."""
@@ -346,12 +365,12 @@ class SpringResult(SpringsResult):
 
 def _both_ends(spring: Spring, a: Any, b: Any) -> Any:
     if spring.ground is not None:
-        b = b + like(np.broadcast_to(np.atleast_2d(spring.ground), b.shape), b)
+        b = b + as_operand(spring.ground, b).reshape(-1, 3)
     return stacked([a, b], -2)
 
 
 def _spans(spring: Spring, vectors: Any) -> Any:
-    return vectors if spring.ground is None else vectors - like(np.atleast_2d(spring.ground), vectors)
+    return vectors if spring.ground is None else vectors - as_operand(spring.ground, vectors).reshape(-1, 3)
 
 
 def _lengths(spring: Spring, vectors: Any) -> Any:
@@ -360,22 +379,22 @@ def _lengths(spring: Spring, vectors: Any) -> Any:
 
 def _tensions(spring: Spring, vectors: Any, rates: Any) -> Any:
     spans, lengths = _spans(spring, vectors), _lengths(spring, vectors)
-    found = like(spring.stiffness, vectors) * (lengths - like(spring.rest_length, vectors))
+    found = as_operand(spring.stiffness, vectors) * (lengths - as_operand(spring.rest_length, vectors))
     if spring.damping is None:
         return found
-    return found + like(spring.damping, vectors) * (spans * rates).sum(-1) / lengths
+    return found + as_operand(spring.damping, vectors) * (spans * rates).sum(-1) / lengths
 
 
 def _forces(spring: Spring, vectors: Any, rates: Any) -> Any:
     spans = _spans(spring, vectors)
     if spring._is_axial:
         return -(_tensions(spring, vectors, rates) / _lengths(spring, vectors))[..., None] * spans
-    found = -like(np.atleast_1d(spring.stiffness)[:, None], vectors) * spans
+    found = -as_operand(spring.stiffness, vectors).reshape(-1, 1) * spans
     if spring.damping is not None:
-        found = found - like(np.atleast_1d(spring.damping)[:, None], vectors) * rates
+        found = found - as_operand(spring.damping, vectors).reshape(-1, 1) * rates
     if spring.direction is None:
         return found
-    along = like(spring.direction, vectors)
+    along = as_operand(spring.direction, vectors)
     return (found * along).sum(-1)[..., None] * along
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.given_values import as_given
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._input.tensors import stacked
@@ -83,7 +84,8 @@ class SpringsResult(Frozen):
         return stacked([law(self._at(k), *(each[k] for each in of_states)) for k in range(count)])
 
     def _at(self, k: int) -> Any:
-        return self._result._values_at(k).current(self._springs)
+        """Return the springs as they were in a state, with tensors for the values that were given so."""
+        return as_given(self._result, self._springs, k)
 
     def _velocities(self) -> Any:
         """Return the velocities of the result's vertices; None if it has none or the springs have no damping."""
@@ -125,11 +127,6 @@ def unit_vector(name: str, value: Numbers | None) -> np.ndarray | None:
     if not np.linalg.norm(vector) > 0.0:
         raise ValueError(f"{name} must not be zero")
     return vector / np.linalg.norm(vector)
-
-
-def like(values: np.ndarray, other: Any) -> Any:
-    """Return numbers as an array or a tensor, as `other` is."""
-    return values if isinstance(other, np.ndarray) else other.new_tensor(np.array(values))
 
 
 def scene_vertices(bodies: Bodies, springs: Springs, vertices: np.ndarray) -> np.ndarray:

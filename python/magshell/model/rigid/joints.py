@@ -134,6 +134,12 @@ class Joint(Owner):
         pulls |= {name for name, way in beyond.items() if way * self._given.get(name, way) < 0}
         return self.replaced(**{name: self._spec.defaults[name] for name in pulls}) if pulls else self
 
+    def _check_in_time(self, name: str, rows: np.ndarray) -> None:
+        """Raise ValueError if values over time, (n, ...), contain one that the joint cannot have."""
+        if rows.ndim == 1:
+            for extreme in np.unique([rows.min(), rows.max()]):
+                self._checked(name, extreme)
+
     def _has(self, name: str) -> bool:
         """Return whether it was made with this number."""
         return name in self._given

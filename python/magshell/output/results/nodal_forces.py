@@ -30,11 +30,8 @@ def nodal_forces(result: Any, index: int) -> dict[str, np.ndarray]:
             )
             np.add.at(forces, held.vertices, held.forces)
         found["reaction"] = forces
-    loads = [load for load in scene.loads if isinstance(load, DeadLoad)]
-    if loads:
-        values, forces = result._values_at(index), np.zeros((scene.mesh.n_vertices, 3))
-        for load in loads:
-            part = scene._bodies.of(load)
-            forces[part.vertices] += values.current(load).vertex_forces(part.mesh)
+    if any(isinstance(load, DeadLoad) for load in scene.loads):
+        numbers = result._values_at(index).numbers  # with the `vertex_loads` of the solve, if there are any
+        forces = scene._value_layout.of(numbers, "loads", "forces")[: scene.mesh.n_vertices]
         found["load"] = np.ravel(result._load_factors)[index] * forces
     return found

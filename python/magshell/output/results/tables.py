@@ -71,9 +71,10 @@ def to_pandas(
 ) -> pandas.DataFrame:
     """Convert a result to a pandas.DataFrame (needs the package pandas), with units in the names of its columns.
 
-    per: "state" gives one row per state, with energies, strains and the uniform field, and in fields that vary in space the
-        factor on them. "vertex" gives one row per vertex and state, with its position and, for a motion, its velocity. The
-        index is `time [s]` of a Trajectory, `parameter` of an EquilibriumPath or `case` of an EquilibriumSet, and `vertex`.
+    per: "state" gives one row per state, with energies, strains and the uniform field; with loads or actuators the factor on
+        them, and in fields that vary in space the factor on those. "vertex" gives one row per vertex and state, with its
+        position and, for a motion, its velocity. The index is `time [s]` of a Trajectory, `parameter` of an EquilibriumPath
+        or `case` of an EquilibriumSet, and `vertex`.
     probes: each ms.Probe adds its columns to those of the states; a reaction or contact force on a path solves its points
         again.
 
@@ -169,6 +170,8 @@ def _own_columns(result) -> dict[str, tuple[str, np.ndarray]]:
         found["kinetic_energy"] = ("J", result.kinetic_energy)
     if isinstance(result, EquilibriumPath):
         found["n_negative_eigenvalues"] = ("1", result.n_negative_eigenvalues)
+    if result.scene.loads or result.scene.actuators:
+        found["load_factor"] = ("1", np.asarray(result._load_factors))
     if any(not isinstance(each, UniformField) for each in result.scene.fields):
         found["field_factor"] = ("1", field_factors(result))
     for name in ("largest_membrane_strain", "largest_bending_strain"):

@@ -511,6 +511,31 @@ def solved(
     return Solved.apply(adjoint, arrays, dtype, *leaves)
 
 
+class _Refused(torch.autograd.Function):
+    """The numbers of a tensor by which there is no gradient."""
+
+    @staticmethod
+    def forward(tensor: torch.Tensor, why: str) -> torch.Tensor:
+        return tensor.clone()
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: torch.Tensor) -> None:
+        ctx.why = inputs[1]
+
+    @staticmethod
+    def backward(ctx: Any, *by_outputs: torch.Tensor) -> None:
+        raise NoGradient(ctx.why)
+
+    @staticmethod
+    def jvp(ctx: Any, *tangents: torch.Tensor) -> None:
+        raise NoGradient(ctx.why)
+
+
+def refused(tensor: torch.Tensor, name: str, why: str) -> torch.Tensor:
+    """Return the numbers of a tensor; NoGradient says why there is no gradient by it where one is asked for."""
+    return _Refused.apply(tensor, f"no gradient by {name}: {why}")
+
+
 def is_transformed(tensor: torch.Tensor) -> bool:
     """Return whether a tensor is wrapped by torch.func or has a tangent of forward-mode differentiation."""
     return _is_wrapped(tensor) or _has_tangent(tensor)

@@ -89,6 +89,7 @@ def simulate_batch(
         else replace(
             _member(axis, k, one.result, n_v, (points[k], edge_rotations[k], velocities[k], driving[k])),
             _rest=row_of(rest, k),
+            _tensors=_connected(axis, k, one),
         )
         for k, one in enumerate(solved.members)
     ]
@@ -135,6 +136,24 @@ class _InTime:
         except ValueError as error:
             return error
         return None
+
+
+def _connected(axis: BatchAxis, member: int, one: Member) -> dict[tuple[Any, str], tuple[Any, bool]]:
+    """Return the tensors of a member's states as parts of the values of the batch.
+
+    Those that were computed from such parts have no gradient.
+    """
+    if not one.result._tensors:
+        return {}
+    from ..adjoint.autograd import refused
+
+    own = [(tensor, each.given_to(member)) for tensor, each in zip(one.tensors, axis.followed, strict=True)]
+    found = {}
+    for (owner, name), (tensor, varies) in one.result._tensors.items():
+        given = [part for copy, part in own if copy is tensor]
+        known = given[0] if given else refused(tensor, name, "it was computed from a value of a batch")
+        found[owner, name] = known, varies
+    return found
 
 
 def _member(

@@ -154,6 +154,22 @@ class MotionInputs:
         at = self.time_points.recorded(after)
         return {key: rows[at] for key, rows in self._scheduled.varied.items()}
 
+    def tensors_in_states(self, after: np.ndarray) -> dict[tuple[Any, str], tuple[Any, bool]]:
+        """Return the tensors with a gradient at the states recorded after so many steps.
+
+        {(object or None, name): (tensor, whether it has a row for each state)}
+        """
+        if not self.inputs.leaves:
+            return {}
+        from ..adjoint.given import given_tensors
+
+        at, found = self.time_points.recorded(after), {}
+        for (owner, name), tensor in given_tensors(self.inputs.leaves).items():
+            item = getattr(owner, "object_in_time", owner)
+            varies = item is not owner or (owner is None and name in self._load_parameters)
+            found[item, name] = (tensor[at] if varies else tensor, varies)
+        return found
+
     def _with_fine_faces(self, start: Any) -> Inputs:
         """Return the inputs with the faces that sample the field finely during the motion.
 

@@ -10,6 +10,7 @@ from ..._input.tensors import detached
 from ...model.actuators.actuator import Actuator
 from ...model.contact.obstacles import Obstacle
 from ...model.fields.field import AppliedField
+from ...model.loads.springs import Springs
 from ...model.shells.shell import Shell
 from ...model.supports.supports import Support
 from .obstacle_paths import ObstaclePath, check_supports
@@ -19,13 +20,15 @@ if TYPE_CHECKING:
     from .motion_inputs import MotionInputs
     from .time_steps import TimePoints
 
+_WITH_RESULTS = (Actuator, AppliedField, Shell, Springs)
+
 
 class ScheduledValues:
     """The values of a scene that change during one motion, at all its time points.
 
     entries: indices of these values in the core's vector of values; rows: (time points, m), the numbers, which follow the
-    load parameters. poses: {number of an obstacle: its poses (time points, 4, 3)}. varied: {(actuator, shell or field,
-    name): (time points, ...)}.
+    load parameters. poses: {number of an obstacle: its poses (time points, 4, 3)}. varied: {(object, name): (time points,
+    ...)}, of the objects whose results or pictures depend on the values of their time.
     """
 
     def __init__(self, asked: MotionInputs, schedules: list[Schedule]):
@@ -36,7 +39,7 @@ class ScheduledValues:
         self._slices: dict[tuple[int, str], list[slice]] = {}
         self.entries: list[int] = []
         self.poses: dict[int, np.ndarray] = {}
-        self.varied: dict[tuple[Actuator | Shell | AppliedField, str], np.ndarray] = {}
+        self.varied: dict[tuple[Any, str], np.ndarray] = {}
         for each in schedules:
             each.check(asked.steps)
         of_values = [each for each in schedules if not isinstance(each.owner, Obstacle)]
@@ -50,9 +53,10 @@ class ScheduledValues:
             numbers = np.reshape(
                 asked.inputs.take(each.name, given, _Values(self, each)), (len(asked.time_points), -1)
             )
-            if isinstance(each.owner, Actuator | Shell | AppliedField):
-                now = self.varied[each.owner, each.name] = numbers.reshape(-1, *each.row)
-                each.owner._check_in_time(each.name, now)
+            now = numbers.reshape(-1, *each.row)
+            each.owner._check_in_time(each.name, now)
+            if isinstance(each.owner, _WITH_RESULTS):
+                self.varied[each.owner, each.name] = now
             self._of_values.append((each, self._add(each, numbers.shape[1])))
             rows += [numbers] * self._of_values[-1][1]
         self.rows: np.ndarray = np.concatenate(rows, axis=1)
@@ -64,8 +68,7 @@ class ScheduledValues:
         rows = [np.zeros((len(points), 0))]
         for schedule, count in self._of_values:
             numbers = np.asarray(detached(value_of(schedule)), dtype=np.float64)
-            if isinstance(schedule.owner, Actuator | Shell | AppliedField):
-                schedule.owner._check_in_time(schedule.name, numbers)
+            schedule.owner._check_in_time(schedule.name, numbers.reshape(-1, *schedule.row))
             rows += [numbers.reshape(len(points), -1)] * count
         poses = {k: np.asarray(detached(path.poses_at(points, value_of))) for k, path in self._paths.items()}
         return np.concatenate(rows, axis=1), poses
@@ -102,9 +105,10 @@ class ScheduledValues:
 
 
 class _Values:
-    """The owner of one schedule as a leaf: gives its gradient at all time points."""
+    """The owner of one schedule as a leaf: gives its gradient at all time points. object_in_time: whose value it is."""
 
     def __init__(self, scheduled: ScheduledValues, schedule: Schedule):
+        self.object_in_time: Any = schedule.owner
         self._slices, self._key = scheduled._slices, (id(schedule.owner), schedule.name)
 
     def by_time_points(self, gradient: Any) -> np.ndarray:

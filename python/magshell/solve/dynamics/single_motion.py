@@ -345,6 +345,7 @@ def _trajectory(motion_inputs: MotionInputs, found, wall_time: float, known=None
         _own_velocities=velocities[:, n_v:] if rigid else None,
         _driving=driving,
         _rest=motion_inputs.inputs.given_rest,
+        _tensors=motion_inputs.tensors_in_states(after),
     )
 
 

@@ -17,12 +17,10 @@ from ..._runtime.frozen import immutable
 from ..._runtime.mixins import AnimateMixin
 from ..._runtime.npz import open_npz
 from ...mesh.triangles.self_intersections import describe_self_intersections
-from ...model.actuators.actuator import Actuator
 from ...model.contact.attached_obstacles import positioned
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.contact.contacts_to_core import near_kinks
-from ...model.fields.field import AppliedField
 from ...model.results.result_lookup import OfOneBody, displacements_of, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
@@ -30,7 +28,6 @@ from ...model.scene.nonsmooth_contacts import near_body_kinks
 from ...model.scene.reactions import Reaction, reaction_in
 from ...model.scene.scene import Scene
 from ...model.scene.values import Values
-from ...model.shells.shell import Shell
 from ...model.shells.strains import StrainHistory, strains_of
 from ...model.supports.displacement_ties import Periodic
 from ...model.supports.supports import Clamp, Pin, SymmetryPlane
@@ -188,6 +185,9 @@ class Trajectory(AnimateMixin, OfOneBody):
     _own_velocities: Any = field(repr=False, default=None)
     _driving: Any = field(repr=False, default=None)  # (n, m) N m or N, of motors in joints
     _rest: Any = field(repr=False, default=None)  # (n_v, 3) m, the rest positions, if a tensor was given
+    _tensors: Any = field(
+        repr=False, default=None
+    )  # {(object or None, name): (tensor, whether a row is a state)}
 
     def __copy__(self) -> Trajectory:
         return self  # immutable
@@ -201,7 +201,8 @@ class Trajectory(AnimateMixin, OfOneBody):
             for each, now in pairs
             if isinstance(now.motion, ObstaclePath | ReadPath)
         }
-        return {**plain_arrays(vars(self)), "_values": {**self._values.to_state(), "paths": paths}}
+        values = {**self._values.to_state(), "paths": paths}
+        return {**plain_arrays(vars(self)), "_values": values, "_tensors": None}
 
     def __setstate__(self, state: dict[Any, Any]) -> None:
         values = Values.from_state(state["scene"], state["_values"])
@@ -220,11 +221,16 @@ class Trajectory(AnimateMixin, OfOneBody):
 
     def _values_at(self, index: int):
         """Return the values of a recorded state, with actuators, growth and field sources as they were then."""
-        then: dict[Actuator | Shell | AppliedField, dict[Any, Any]] = {}
+        then: dict[Any, dict[str, Any]] = {}
         for (owner, name), rows in self._varied.items():
             then.setdefault(owner, {})[name] = rows[index]
         now = {each: self._values.current(each).replaced(**named) for each, named in then.items()}
         return self._values.with_objects(now) if now else self._values
+
+    def _tensors_at(self, index: int) -> dict[tuple[Any, str], Any]:
+        """Return the tensors with a gradient that hold in a recorded state, {(object or None, name): tensor}."""
+        given = (self._tensors or {}).items()
+        return {key: tensor[index] if varies else tensor for key, (tensor, varies) in given}
 
     @property
     def _obstacles(self) -> tuple[Any, ...]:

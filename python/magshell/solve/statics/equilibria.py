@@ -93,6 +93,13 @@ class EquilibriumSet(SaveMixin, OfOneBody, Sequence[Equilibrium]):
     def _values_at(self, index: int):
         return self._cases[index]._values
 
+    def _tensors_at(self, index: int) -> dict[tuple[Any, str], Any]:
+        return self._cases[index]._tensors_at(0)
+
+    @property
+    def _rest(self) -> Any:
+        return self._cases[0]._rest
+
     @property
     def _load_factors(self) -> np.ndarray:
         return np.array([case._load_factors for case in self._cases])

@@ -112,6 +112,14 @@ class Equilibrium(SaveMixin, OfOneBody):
     def _values_at(self, index: int):
         return self._values
 
+    def _tensors_at(self, index: int) -> dict[tuple[Any, str], Any]:
+        """Return the tensors with a gradient that the solve was given, {(object or None, name): tensor}."""
+        if self._inputs is None or not self._inputs.leaves:
+            return {}
+        from ..adjoint.given import given_tensors
+
+        return given_tensors(self._inputs.leaves)
+
     @property
     def _load_factors(self) -> np.ndarray:
         """The load factor of the only state, ()."""

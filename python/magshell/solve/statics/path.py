@@ -227,6 +227,9 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
     def _load_factors(self) -> np.ndarray:
         return self._load_parameter("load_factor")[:, 0]
 
+    def _tensors_at(self, index: int) -> dict[tuple[Any, str], Any]:
+        return {}  # positions along a path are arrays
+
     def _values_at(self, index: int):
         return self._moving.values(self.parameters[index])
 
