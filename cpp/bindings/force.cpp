@@ -1,4 +1,5 @@
-// Binds the forces without an energy, element by element, for tests. Scenes use the whole terms.
+// Binds water: its properties, of which a scene takes one object, and its force on single faces, for ms.Water.force and tests. Solves use
+// cpp/magshell/terms/load/water_term.h instead.
 #include <algorithm>
 #include <array>
 #include <memory>

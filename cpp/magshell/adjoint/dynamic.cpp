@@ -17,6 +17,8 @@ struct Viscous {
     ViscousAdjoint strains, joints;
 };
 
+// Goes backwards from the last step to the first. The members g_, by_w_, by_v_before_, by_dt_before_ and by_strains_ hold the gradients with
+// respect to the state at the beginning of the last step processed. g_ and scene_ also sum those with respect to the inputs.
 class Backward {
   public:
     Backward(Newton& newton, const MotionInput& input, const MotionResult& motion,
@@ -40,13 +42,14 @@ class Backward {
     MotionGradient run() {
         add_state_gradient(motion_.steps_done);
         Index end = motion_.steps_done;
+        // The last steps are stored with all their stages; those before them are repeated from checkpoints.
         for (std::size_t k = motion_.steps.size(); k-- > 0;) back(--end, motion_.steps[k]);
-        const CheckpointedReverse stretches(
+        const CheckpointedReverse segments(
             motion_.leaf, [this](Index begin, Index end, MotionState& state) { forward(begin, end, state); },
             [this](Index begin, Index end, const MotionState& state) { leaf(begin, end, state); });
         Index free = motion_.slots - static_cast<Index>(motion_.checkpoints.size()) + 1;
         for (auto at = motion_.checkpoints.rbegin(); at != motion_.checkpoints.rend(); ++at, ++free) {
-            stretches.back(at->first, end, at->second, free);
+            segments.back(at->first, end, at->second, free);
             end = std::min(end, at->first);
         }
         back_to_start();
@@ -61,11 +64,13 @@ class Backward {
     double progress() const { return progress_; }
 
   private:
+    // Repeats steps from the state at `begin`, which becomes that at `end`.
     void forward(Index begin, Index end, MotionState& state) {
         for (Index step = begin; step < end; ++step)
             repeat_step(stepper_, input_, step, substeps_of(motion_.substeps, step), state, nullptr);
     }
 
+    // Repeats steps with all their stages, and computes their adjoint.
     void leaf(Index begin, Index end, MotionState state) {
         std::vector<std::vector<SubstepRecord>> steps(end - begin);
         for (Index step = begin; step < end; ++step)
@@ -74,6 +79,7 @@ class Backward {
         for (Index step = end - 1; step >= begin; --step) back(step, steps[step - begin]);
     }
 
+    // Computes the adjoint of a step, substep by substep.
     void back(Index step, const std::vector<SubstepRecord>& records) {
         progress_ = 1.0 - static_cast<double>(step + 1) / static_cast<double>(motion_.steps_done);
         const Substeps substeps = substeps_of(motion_.substeps, step);
@@ -120,6 +126,7 @@ class Backward {
         g_.positions -= by_forces.begin;
     }
 
+    // Computes the adjoint of a substep, stage by stage, by the formulas of dynamic.h. adt: a dt.
     void back(Index step, const Substep& substep, const SubstepRecord& record,
               const VectorXd& by_motor_forces) {
         const double fraction = substep.fraction();
@@ -164,7 +171,7 @@ class Backward {
         for (int i = n - 1; i >= 0; --i) {
             const VectorXd& v = at.all[first + i].v;
             const VectorXd w = algebra.stage_acceleration(at.all[first + i], at.v_hat[i]);
-            // By w_i without contact, and by that with it.
+            // Gradients with respect to e_i, the acceleration without contact, and to w_i = e_i + F c_i, the one with it (dynamic.h).
             const VectorXd& by_ei = by_w[first + i];
             const VectorXd by_wi = i == n - 1 ? VectorXd(by_ei + by_w_last) : by_ei;
             const VectorXd& by_vi = by_v[first + i] += by_wi / adt;
@@ -480,12 +487,12 @@ class Backward {
     const GradientsByStates& by_;
     Stepper stepper_;
     Gradient scene_;  // by all parameters, and by the load parameters of the current stage
-    // Gradients with respect to the rates and by the Maxwell strains at the beginning of the last step processed.
+    // By the acceleration with which the last step processed begins; empty if its method needs none.
     VectorXd by_w_;
-    VectorXd
-        by_v_before_;  // by the velocity at the beginning of the step before that; empty if nothing depends on it
-    double by_dt_before_ = 0.0;  // by the length of the substep before the last one processed
-    ViscousGradient by_strains_;
+    // By the velocity at the beginning of the step before that; empty if nothing depends on it.
+    VectorXd by_v_before_;
+    double by_dt_before_ = 0.0;   // by the length of the substep before the last one processed
+    ViscousGradient by_strains_;  // by the strains, their rates and the Maxwell strains with which it begins
     double progress_ = 0.0;
 };
 

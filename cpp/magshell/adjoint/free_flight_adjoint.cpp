@@ -14,6 +14,8 @@ void FreeFlightAdjoint::through_finish(const VectorXd& q, const VectorXd& v, con
         const FreeBody& body = *flight.body;
         Of& by = by_[k];
         const RigidMotion end = body.motion(q, v);
+        // FreeFlight::finish: velocities become those of the rigid motion `end` with the same momenta, accelerations become
+        // w + w^f(end) - w^f(last), with the torque-free accelerations w^f. `now`: the torque-free state that begins at `end`.
         const Mat3& inverse = body.inverse_inertia();
         const TorqueFreeRotation::State now = TorqueFreeRotation::State::of(inverse, end.turn, end.momentum);
         TorqueFreeRotation::StateGradient by_now;

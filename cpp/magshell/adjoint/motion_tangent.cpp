@@ -270,7 +270,8 @@ class ForwardSweep {
         return serves ? newton_.factor().get() : nullptr;
     }
 
-    // Returns the derivative of M (v - v^)/T + Gamma v at a fixed state q, with v = (q - x^)/T. rates: v, and w = (v - v^)/T.
+    // Returns the derivative of the inertial and damping forces M w + Gamma v at a fixed state q, with v = (q - x^)/T, w = (v - v^)/T and the
+    // time T = a dt of the stage.
     VectorXd inertia_tangent(const StageTangent& stage, const VectorXd& v, const VectorXd& w) const {
         const Inertia& inertia = input_.inertia;
         const VectorXd v_tangent = -(stage.x_hat_tangent + stage.T_tangent * v) / stage.T;

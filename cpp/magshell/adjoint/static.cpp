@@ -18,6 +18,7 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     model.evaluate(q, load_parameters);
     if (needs_hessian(model, equilibrium) || dof_map.has_values() || rest.asked)
         model.assemble(q, load_parameters, false);
+    // Adds H^T times a motion of all dofs.
     const auto add_product = [&](const VectorXd& motion, VectorXd& forces) {
         VectorXd product(q.size());
         model.multiply(motion, product);
@@ -25,6 +26,7 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
         forces += product;
     };
     VectorXd by_q = by_state, motors = VectorXd::Zero(q.size());
+    // motors: B z of static.h, the motion along the prescribed joints, whose part of the adjoint needs no solve.
     if (has_motor_gradient) {
         motors = dof_map.motor_motion(by_motor_forces);
         add_product(motors, by_q);
@@ -37,6 +39,7 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     const VectorXd lambda = dof_map.expand(reduced);
     Gradient gradient(model.parameters().registry());
     model.parameters().vjp(q, load_parameters, lambda + motors, gradient);
+    // by_q: dF/dq + H lambda; its prescribed part acts on the values of supports and joints, and on rest positions.
     if (dof_map.has_values() || rest.asked) add_product(lambda, by_q);
     if (rest.asked) {
         rest.clear(model);

@@ -14,8 +14,8 @@ bool ContactLayer::couples(const Group& group) const {
 }
 
 void ContactLayer::add_couplings(std::vector<Group> groups) {
-    // Groups that are kept, over those needed now; see test_contact_that_opens_and_closes_in_every_step.
-    constexpr std::size_t too_many = 3;  // see test_contact_that_opens_and_closes_in_every_step
+    // [-] Largest number of groups that are kept, over those needed now; fixed by test_contact_that_opens_and_closes_in_every_step.
+    constexpr std::size_t too_many = 3;
     std::sort(groups.begin(), groups.end());
     groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
     std::vector<Group> all;

@@ -6,6 +6,7 @@
 namespace magshell {
 
 void NodeMatrix::finish() {
+    // Makes every diagonal entry present.
     for (Index point = 0; point < points_; ++point) entries_.push_back({point, point, 0.0});
     // A stable sort makes the sums independent of the sorting algorithm.
     std::stable_sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
@@ -31,7 +32,7 @@ void NodeMatrix::finish() {
 VectorXd NodeMatrix::times(const VectorXd& x) const {
     VectorXd y = VectorXd::Zero(x.size());
     for (Index j = 0; j < points_; ++j) {
-        Index k = column_starts_[j];
+        Index k = column_starts_[j];  // the diagonal entry
         const Vec3 own = x.segment<3>(3 * j);
         Vec3 sum = values_[k] * own;
         for (++k; k < column_starts_[j + 1]; ++k) {

@@ -29,7 +29,7 @@ std::vector<std::vector<Index>> holders(Index count, const std::vector<Clique>& 
     return of;
 }
 
-// Collects distinct numbers; starting a new set costs nothing.
+// Collects the distinct numbers of a round. A new round needs no clearing, because each number is marked with its last round.
 class Marks {
   public:
     explicit Marks(Index count) : last_(count, -1) {}
@@ -63,6 +63,7 @@ SystemMatrix::SystemMatrix(Index nodes, Index rotations, const std::vector<Stenc
             throw InvalidInput("the mesh is too large: its Hessian has more than 2^30 entries");
         column_starts_.push_back(static_cast<Index>(rows_.size()));
     };
+    // The rows of each column, from the diagonal on: those of the nodes, then of the edge rotations, with which node j is coupled.
     for (Index j = 0; j < nodes; ++j) {
         beside.clear();
         beside_rotations.clear();
@@ -132,7 +133,8 @@ void SystemMatrix::add_diagonal(VectorXd& out) const {
 }
 
 void SystemMatrix::add_product(const double* x, double* y) const {
-    // Processes the three columns of a node at once, because their rows are the same.
+    // Processes the three columns of a node at once, because their rows are the same. a, b, c: these columns, shifted so that index k means
+    // the same row in all three; their diagonal entries are a[0], b[1] and c[2].
     for (Index j = 0; j < 3 * nodes_; j += 3) {
         const Index start = column_starts_[j], length = column_starts_[j + 1] - start;
         const double *a = values_.data() + start, *b = a + length - 1, *c = b + length - 2;

@@ -9,10 +9,10 @@ namespace {
 
 // [rad] Smallest angle opposite the long edge of a cap; see test_obtuse_faces_inside_a_sheet_do_not_stiffen_it.
 constexpr double cap_angle = 150.0 / 180.0 * std::numbers::pi;
-constexpr double flat =
-    0.1;  // [rad] rest angle above which an edge is a fold that stays; see test_faces_at_folds_and_hinges_keep_their_own_triangles
-constexpr double softer =
-    0.5;  // [-] curvature scale, over that of the neighbours, below which an edge is a hinge; see test_faces_at_folds_and_hinges_keep_their_own_triangles
+// [rad] Rest angle above which an edge is a fold that stays; see test_faces_at_folds_and_hinges_keep_their_own_triangles.
+constexpr double flat = 0.1;
+// [-] Curvature scale, over that of the neighbours, below which an edge is a hinge; see the same test.
+constexpr double softer = 0.5;
 
 double angle_at(const Vec3& corner, const Vec3& a, const Vec3& b) {
     const Vec3 u = a - corner, v = b - corner;
@@ -23,7 +23,8 @@ double largest_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
     return std::max({angle_at(a, b, c), angle_at(b, c, a), angle_at(c, a, b)});
 }
 
-// Returns by how much the largest angle falls if the other diagonal is used [rad]; 0 if the edge of this dihedral angle stays.
+// Returns by how much the largest angle of both faces falls if their quadrilateral is cut along its other diagonal [rad]; 0 if it must not be.
+// Nodes of the stencil: 0 and 1 are the ends of the common edge, 2 and 3 the corners opposite it.
 double gain(const std::vector<Vec3>& rest, const DihedralStencil& dihedral) {
     const auto at = [&](int k) -> const Vec3& { return rest[dihedral.nodes[k]]; };
     const double tip = std::max(angle_at(at(2), at(0), at(1)), angle_at(at(3), at(0), at(1)));

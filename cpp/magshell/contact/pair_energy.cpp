@@ -11,7 +11,8 @@ struct RankTwo {
     double u_u = 0.0, u_v = 0.0, v_v = 0.0;
 };
 
-/// Returns p (d u u^T + u v^T + v u^T), or its positive semidefinite projection.
+/// Returns the bracket of the Hessian (pair_energy.h) for one free direction, p (d u u^T + u v^T + v u^T) with p = push and the distance d, or
+/// its positive semidefinite projection. The lengths of u and v follow from `slide`, w', and `weights`, w, as n and f are unit vectors.
 RankTwo of_free(double push, double distance, const PairWeights& slide, const PairWeights& weights,
                 bool project_psd) {
     if (!project_psd) return {push * distance, push, 0.0};
@@ -80,7 +81,7 @@ void PairEnergy::hessian(bool project_psd, PairBlocks& blocks) const {
     const double push = -edges_.factor * slope_, d = near_.distance;
     const double curvature = edges_.factor * (project_psd ? std::max(curvature_, 0.0) : curvature_);
     const int count = nodes_of(pair_.kind);
-    RankTwo part[2];
+    RankTwo part[2];  // per tangential direction f_a, free or fixed
     Mat3 across = Mat3::Zero();
     for (int a = 0; a < 2; ++a) {
         if (a < near_.free)
@@ -89,7 +90,7 @@ void PairEnergy::hessian(bool project_psd, PairBlocks& blocks) const {
             part[a].v_v = project_psd ? std::max(-push / d, 0.0) : -push / d;
         if (part[a].v_v != 0.0) across += part[a].v_v * near_.along[a] * near_.along[a].transpose();
     }
-    Vec3 turning[4];
+    Vec3 turning[4];  // sum_a u_v w_ai' f_a: block (i, j) of sum_a u_v u_a v_a^T is w_j n turning_i^T
     for (int i = 0; i < count; ++i)
         turning[i] = part[0].u_v * near_.slide[0][i] * near_.along[0] +
                      part[1].u_v * near_.slide[1][i] * near_.along[1];

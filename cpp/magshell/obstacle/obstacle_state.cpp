@@ -27,6 +27,8 @@ void ObstacleState::vjp(const Vec3& x, const Distance& at, double by_distance, c
     out.pose.displacement += by_center;
     out.pose.velocity -= by_relative_velocity;
     out.pose.spin += by_relative_velocity.cross(from_center);
+    // A small rotation w of the obstacle about its center changes the distance by -n . (w x (x - c)), the normal by w x n - K (w x (x - c)), with
+    // K the curvature d2d/dx2. by_turn: the gradient with respect to w.
     const Vec3 by_turn = at.normal.cross(by_normal) - from_center.cross(by_place);
     out.pose.rotation_vector += transposed_jacobian_times(pose_.rotation_vector, by_turn);
     out.placement.rotation_vector +=
