@@ -71,9 +71,10 @@ def uniaxial(energy, stretch):
 
 
 def closed_form(name, young=1e6, nu=0.45):
+    """Return the energy density W(a, t) [Pa] of a material under the principal stretches a, t, t."""
     lam, mu = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
 
-    def energy(a, t):  # stretches a, t, t
+    def energy(a, t):
         i1, j = a**2 + 2 * t**2, a * t**2
         if name == "ln J":
             return mu / 2 * (i1 - 3) - mu * torch.log(j) + lam / 2 * torch.log(j) ** 2

@@ -13,7 +13,7 @@ def bowl(x):
 
 
 def started(path, make, objective=bowl, **options):
-    """Runs five iterations into a checkpoint, or on from it."""
+    """Minimize with a checkpoint for five iterations; with resume=True, continue from the checkpoint."""
     x = torch.tensor([0.0, 0.1, 0.15], dtype=torch.float64, requires_grad=True)
     options = {"max_iterations": 5, "progress": False, "checkpoint": path, **options}
     return ms.minimize(objective, [x], make, **options), x
@@ -27,7 +27,7 @@ def mma(**options):
     return lambda parameters: ms.optim.MMA(parameters, **{"lower": 0.0, "upper": 0.5, **options})
 
 
-def torchs(kind, **options):
+def torch_optimizer(kind, **options):
     return lambda parameters: getattr(torch.optim, kind)(parameters, **options)
 
 
@@ -46,9 +46,17 @@ def torchs(kind, **options):
         (lbfgs(), lbfgs(max_backtracks=3), "max_backtracks was 6 and is 3"),
         (mma(), mma(move=0.1), "move of group 0 was 1 and is 0.1"),
         (mma(), mma(penalty=10.0), "penalty was 1000 and is 10"),
-        (torchs("SGD", lr=0.1), torchs("SGD", lr=0.2), "lr of group 0 was 0.1 and is 0.2"),
-        (torchs("Adam"), torchs("Adam", amsgrad=True), "amsgrad of group 0 was False and is True"),
-        (torchs("Adam"), torchs("Adam", betas=(0.5, 0.999)), r"betas of group 0.* was 0.9 and is 0.5"),
+        (torch_optimizer("SGD", lr=0.1), torch_optimizer("SGD", lr=0.2), "lr of group 0 was 0.1 and is 0.2"),
+        (
+            torch_optimizer("Adam"),
+            torch_optimizer("Adam", amsgrad=True),
+            "amsgrad of group 0 was False and is True",
+        ),
+        (
+            torch_optimizer("Adam"),
+            torch_optimizer("Adam", betas=(0.5, 0.999)),
+            r"betas of group 0.* was 0.9 and is 0.5",
+        ),
     ],
 )
 def test_resuming_with_other_options_is_refused(before, after, words, tmp_path):

@@ -26,18 +26,19 @@ def bowl(x):
     return ((x - 2) ** 2).sum()
 
 
-class Walled:
-    """A bowl in which only designs within a distance of where one stands can be evaluated."""
+class NearbyBowl:
+    """The quadratic objective `bowl`, which rejects designs farther than `reach` from the last accepted one."""
 
     def __init__(self, x, reach):
         self.x, self.reach, self.refused = x, reach, 0
-        self.stand()
+        self.accept()
 
-    def stand(self, record=None):
-        self.here = self.x.detach().clone()
+    def accept(self, record=None):
+        """Take the current design as the accepted one; also the callback of ms.minimize."""
+        self.accepted = self.x.detach().clone()
 
     def __call__(self, x):
-        if (x.detach() - self.here).norm() > self.reach:
+        if (x.detach() - self.accepted).norm() > self.reach:
             self.refused += 1
             raise ms.NotConverged("too far")
         return bowl(x)
@@ -46,12 +47,12 @@ class Walled:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_rejected_step_goes_less_far(method):
     x = design(-3.0, 4.0)
-    walled, optimizer = Walled(x, 0.9), method([x], lower=-5.0, upper=5.0)
-    begin, closure = bowl(x).item(), lambda: walled(x)
+    nearby, optimizer = NearbyBowl(x, 0.9), method([x], lower=-5.0, upper=5.0)
+    begin, closure = bowl(x).item(), lambda: nearby(x)
     value = optimizer.step(closure)
-    assert walled.refused > 0 and value == bowl(x).item() < begin
+    assert nearby.refused > 0 and value == bowl(x).item() < begin
     for _ in range(60):
-        walled.stand()
+        nearby.accept()
         optimizer.step(closure)
     np.testing.assert_allclose(x.detach(), 2.0, atol=1e-4)
 
@@ -98,11 +99,11 @@ def test_a_step_rejected_at_every_length_changes_nothing(method):
 @pytest.mark.parametrize("method", [*METHODS, adam])
 def test_records_count_the_rejected(method):
     x = design(-3.0, 4.0)
-    walled = Walled(x, 0.3)
+    nearby = NearbyBowl(x, 0.3)
     found = quiet(
-        walled, [x], lambda p: method(p, lower=-5.0, upper=5.0), max_iterations=5, callback=walled.stand
+        nearby, [x], lambda p: method(p, lower=-5.0, upper=5.0), max_iterations=5, callback=nearby.accept
     )
-    assert sum(record.rejected for record in found.history) == walled.refused > 0
+    assert sum(record.rejected for record in found.history) == nearby.refused > 0
     assert found.history[0].rejected == 0 and not any(record.jumped for record in found.history)
     assert found.objective == min(record.objective for record in found.history) < bowl(design(-3.0, 4.0))
 
@@ -110,9 +111,9 @@ def test_records_count_the_rejected(method):
 @pytest.mark.parametrize("method", [*METHODS, adam])
 def test_an_unfound_equilibrium_at_every_length_ends_with_the_best(method):
     x = design(-3.0, 4.0)
-    walled = Walled(x, 1e-9)
+    nearby = NearbyBowl(x, 1e-9)
     with pytest.raises(ms.ObjectiveFailed, match="7 designs rejected: too far") as caught:
-        quiet(walled, [x], lambda p: method(p, lower=-5.0, upper=5.0))
+        quiet(nearby, [x], lambda p: method(p, lower=-5.0, upper=5.0))
     assert isinstance(caught.value.__cause__, ms.NotConverged)
     assert caught.value.last_good.objective == bowl(x).item() and x.tolist() == [-3.0, 4.0]
 

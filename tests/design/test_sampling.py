@@ -20,7 +20,7 @@ def test_starts_lie_in_their_box_and_have_its_shape():
 def test_starts_are_spread_evenly():
     starts = ms.random_starts(64, [0.0, 0.0], 1.0)
     cells = np.floor(starts * 8).astype(int)
-    assert len({tuple(cell) for cell in cells}) == 64  # one in every cell of the chessboard
+    assert len({tuple(cell) for cell in cells}) == 64  # 64 starts, one in each cell of an 8 x 8 grid
 
 
 @pytest.mark.parametrize("size", [3, 21202])

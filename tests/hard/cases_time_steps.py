@@ -48,7 +48,7 @@ def same_motion_in_any_steps(time_step):
 
 
 def exact_fall(scene: ms.Scene, time: float) -> np.ndarray:
-    """Compute the displacements of a strip suddenly under gravity, by all modes of the linear problem."""
+    """Compute the displacements (n_v, 3) [m] a time [s] after gravity begins to act, by all modes of the linear problem."""
     problem = Problem(scene, LoadParameters(gravity_factor=1.0))
     model = problem.model
     q = model.rest_state()

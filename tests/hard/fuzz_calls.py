@@ -14,7 +14,7 @@ import magshell as ms
 
 @dataclass
 class Call:
-    """A function to call, with arguments that it takes. cost: how many times rarer than others it is drawn."""
+    """A function to call, with valid arguments. cost: a call of cost c is drawn c times less often than one of cost 1."""
 
     name: str
     function: Callable
@@ -240,6 +240,7 @@ def _fields(s: Sample) -> Iterator[Call]:
 
 
 def _magpylib_field(length_scale):
+    """Make the field of a magnetized ball; magpylib is imported only if this call is drawn."""
     import magpylib
 
     ball = magpylib.magnet.Sphere(polarization=(0, 0, 1), diameter=0.01)
@@ -403,7 +404,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         {
             "run": math.sqrt,
             "starts": [1.0, 2.0],
-            "executor": _here(),
+            "executor": _one_thread(),
             "workers": None,
             "attempts": 1,
             "feasibility": 1e-6,
@@ -418,7 +419,7 @@ def _solves(s: Sample) -> Iterator[Call]:
         {
             "function": _root,
             "parameters": {"x": [1.0, 4.0]},
-            "executor": _here(),
+            "executor": _one_thread(),
             "workers": None,
             "attempts": 1,
             "checkpoint": None,
@@ -433,7 +434,7 @@ def _solves(s: Sample) -> Iterator[Call]:
             "function": _root,
             "parameters": {"x": [1.0, 4.0]},
             "folder": s.folder / "streamed",
-            "executor": _here(),
+            "executor": _one_thread(),
             "chunk": 2,
             "workers": None,
             "attempts": 1,
@@ -449,10 +450,11 @@ def _solves(s: Sample) -> Iterator[Call]:
 
 
 def _root(x: float) -> float:
+    """Return the square root: the function of the studies."""
     return math.sqrt(x)
 
 
-def _here():
+def _one_thread():
     from concurrent.futures import ThreadPoolExecutor
 
     return ThreadPoolExecutor(1)

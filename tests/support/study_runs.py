@@ -12,7 +12,7 @@ import magshell as ms
 
 
 def cantilever(field: float, thickness: float) -> dict:
-    """Return the rise of the end of a magnetized strip, and the iterations."""
+    """Return the highest z [m] of a magnetized strip in a field [T], and whether its equilibrium is stable."""
     mesh = ms.meshes.rectangle(0.04, 0.01, cells=(8, 2))
     sheet = ms.Shell(mesh, thickness=thickness, young_modulus=1e6)
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
@@ -21,14 +21,14 @@ def cantilever(field: float, thickness: float) -> dict:
 
 
 def root(x: float) -> float:
-    """Return the square root, and fail for negative numbers."""
+    """Return the square root; raise ArithmeticError for a negative number."""
     if x < 0:
         raise ArithmeticError(f"{x} has no root")
     return x**0.5
 
 
 def counted(x: float, folder: str) -> float:
-    """Return the square, and leave a file for every call."""
+    """Return the square, and create a file in the folder, so that tests can count the calls."""
     Path(folder, f"{x:g}-{os.getpid()}-{len(list(Path(folder).iterdir()))}").touch()
     return x**2
 
@@ -41,13 +41,14 @@ def killed(x: float) -> float:
 
 
 def other(x: float) -> float:
+    """Return the cube: a function that a study of `root` was not made with."""
     return x**3
 
 
 def wave(x: float, folder: str) -> dict:
-    """Return an array, a number and a text, and leave a file for every call.
+    """Return an array, a number and a text, and create a file in the folder, so that tests can count the calls.
 
-    From x = 0.9 on it waits as long as there is a file "hold".
+    From x = 0.9 on it waits as long as the folder contains a file "hold".
     """
     Path(folder, f"{x:g}-{os.getpid()}").touch()
     while x > 0.85 and Path(folder, "hold").exists():

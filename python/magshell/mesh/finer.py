@@ -50,7 +50,7 @@ class FinerMesh:
 
     @property
     def of_sides(self) -> np.ndarray:
-        """The coarse element of a sheet, or the outer side of one of a solid, that each of the finer mesh lies in."""
+        """The coarse face of a shell, or outer side of a solid, that each face or outer side of the finer mesh lies in."""
         return self.element_parents if self.side_parents is None else self.side_parents
 
 
@@ -79,8 +79,10 @@ def divided(mesh: QuadraticTriangleMesh, project: Project | None) -> FinerMesh:
     fine = mesh.refined(project)
     n = np.arange(mesh.n_elements)
     ends, middle = mesh.edges, mesh.edge_nodes
+    # Edge e has the halves 2 e and 2 e + 1.
     halves = np.stack([ends[:, 0], middle, middle, ends[:, 1]], axis=1).reshape(-1, 2)
     of_halves = row_numbers(halves, fine.edges)
+    # The new nodes are the midside nodes of the halves of all edges, then three inside each element.
     on_edges = np.repeat(np.arange(mesh.n_edges), 2)
     new_edges = np.concatenate([on_edges, np.full(3 * mesh.n_elements, -1)])
     quarters = np.concatenate([ends, middle[:, None], ends[:, ::-1], middle[:, None]], axis=1).reshape(-1, 3)
@@ -122,11 +124,11 @@ def _bisected_six(mesh: QuadraticTriangleMesh, marked: np.ndarray, project: Proj
     split_edges = bisected_edges(mesh.corners, marked)
     faces, parents = divided_faces(mesh.corners, split_edges)
     corners = np.concatenate([mesh.corner_vertices, mesh.edge_nodes[split_edges]])[faces]
-    within = (mesh.elements[parents][:, None, :] == corners[:, :, None]).argmax(
-        axis=2
-    )  # 3 to 5: midside nodes
+    # The place of each new corner among the six nodes of its parent element: 0 to 2 corners, 3 to 5 midside nodes.
+    within = (mesh.elements[parents][:, None, :] == corners[:, :, None]).argmax(axis=2)
     sides = [(0, 1), (1, 2), (2, 0)]
     ends = np.concatenate([corners[:, side] for side in sides])
+    # Every edge of the divided faces once. `whole`: the coarse edge that it equals, or -1: it then gets a new midside node.
     keys, first, which = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_inverse=True)
     local = np.concatenate([within[:, side] for side in sides])[first]
     owners = np.tile(parents, 3)[first]

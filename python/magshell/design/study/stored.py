@@ -1,4 +1,4 @@
-"""Reads the table of a streamed study from its folder, chunk by chunk."""
+"""The table of a streamed study, read from its folder chunk by chunk."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .chunk_files import Columns, chunk_path, form_of, read_chunk, read_descript
 @immutable
 @dataclass(frozen=True, eq=False, repr=False)
 class StoredStudy:
-    """Reads the table of a streamed study from the disk: `chunks` holds one chunk in memory, `[name]` one whole column.
+    """The table of a streamed study on the disk: `chunks()` reads one chunk at a time, `[name]` one whole column.
 
-    folder: that of `ms.stream_study`, which may still run. n_points: of the whole study. chunk: points in a file; the last
-        may have fewer.
+    folder: that of `ms.stream_study`, which may still run. n_points: number of points of the whole study. chunk: number of
+        points in each file; the last one may have fewer.
 
     Raises ValueError if the folder holds no streamed study, and OSError if it cannot be read.
 
@@ -60,7 +60,7 @@ class StoredStudy:
         return tuple(k for k in range(self.n_chunks) if k not in finished)
 
     def __len__(self) -> int:
-        """Return the number of points whose rows are there."""
+        """Return the number of points in the finished chunks."""
         return sum(self._rows(k) for k in self.finished)
 
     def chunks(self) -> Iterator[Columns]:
@@ -124,5 +124,5 @@ class StoredStudy:
 
 
 def stored_form(stored: StoredStudy) -> dict[str, object]:
-    """Return the form of the outputs of the first chunk that has any; see `form_of`."""
+    """Return {name: shape of a row, or "text"} of the outputs, from the first chunk in which a point succeeded."""
     return next((form for form in map(form_of, stored.chunks()) if form), {})

@@ -57,8 +57,9 @@ def pairs_with_obstacles(
     velocities: np.ndarray,
     time: float | None,
 ) -> dict[str, np.ndarray]:
-    """Return the contact pairs with obstacles, in the arrays that the core's `touching_pairs` returns for pairs of
-    bodies.
+    """Return the contact pairs with obstacles in the arrays in which `_core.touching_pairs` returns pairs of bodies.
+
+    Each pair is a point of the body, a vertex or a sample point of a face, that is nearer than the offset to an obstacle.
 
     all_points, velocities: of the vertices and of the points of rigid bodies, (n, 3). time: s; None in an equilibrium.
     """
@@ -67,7 +68,7 @@ def pairs_with_obstacles(
     stiffness, smoothing, offset, coefficient, sticking_speed = numbers
     corners = np.where(weights != 0.0, vertices, 0)
     points = np.einsum("pk,pkc->pc", weights, all_points[corners])
-    moves = np.einsum("pk,pkc->pc", weights, velocities[corners])
+    point_velocities = np.einsum("pk,pkc->pc", weights, velocities[corners])
     found: dict[str, list[np.ndarray]] = {}
     for each in contact.obstacles:
         body = obstacle_state(scene, values.current(each), time, all_points, velocities)
@@ -76,7 +77,7 @@ def pairs_with_obstacles(
         at = points[active]
         normals = body.obstacle.normals(at, body.time)
         forces = stiffness * _smoothed_depth(offset - distances[active], smoothing)
-        relative = moves[active] - body.velocities(at)
+        relative = point_velocities[active] - body.velocities(at)
         sliding = relative - np.sum(relative * normals, axis=1)[:, None] * normals
         of_vertices = np.pad(weights[active], ((0, 0), (0, 1)))
         rows = {
@@ -145,7 +146,7 @@ class ContactState:
     friction: np.ndarray
     normal_force_magnitudes: np.ndarray
     _pushes: np.ndarray  # (n_v, 3) N, the normal forces alone, without the moments on nearly parallel edges
-    # (k,), 1 if the first part is on the contact's first body or at an obstacle, else -1
+    # (k,), 1 if the first part of the pair is on the first body of the contact, or on the body at an obstacle; else -1
     _direction: np.ndarray
 
     @property
@@ -228,8 +229,9 @@ def compute_contact_state(
 
 
 def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: float) -> ContactState:
+    """Build the state from the arrays of `_core.touching_pairs`, and sum the forces of the pairs on each vertex."""
     pairs, weights = found["pairs"], found["weights"]
-    there = pairs >= 0
+    there = pairs >= 0  # False for the padding of pairs of three or two vertices
 
     def on_vertices(rows: np.ndarray) -> np.ndarray:
         """Sum rows of the pairs' vertices, (k, 4) or (k, 4, 3), to the vertices of the scene."""

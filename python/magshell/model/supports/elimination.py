@@ -1,4 +1,4 @@
-"""Solves the equations between displacements of vertices for some of them, one each, as the core takes them."""
+"""Solves the equations of displacement ties, each for one dof, by Gaussian elimination. The core takes the result."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from .displacement_ties import Equations
 
-_ROUND_OFF = 1e-12  # [-] coefficients below vanish
-_PARALLEL = 1e-9  # [-] of a direction along another
+_ROUND_OFF = 1e-12  # [-] Coefficients below this count as zero.
+_PARALLEL = 1e-9  # [-] Largest component of a unit vector across an axis to which it counts as parallel.
 
 
 class TiedDof(NamedTuple):
@@ -69,8 +69,9 @@ def eliminated(
         moves = _moves_of(group, number_of_move)
         given |= {number: group.move for number, _ in moves}
         for row in group.vertices.tolist():
-            parts: dict[int, float] = {}
-            right = dict(moves)
+            # The equation, with the dofs that are solved for already replaced: sum of parts = sum of right.
+            parts: dict[int, float] = {}  # weights by dof
+            right = dict(moves)  # weights by (move, axis)
             order = []
             for vertex, weight in zip(row, group.weights.tolist(), strict=True):
                 dof, sign = _dof(vertex, group, frames)
@@ -93,6 +94,7 @@ def eliminated(
                 {dof: -scale * w for dof, w in parts.items()},
                 {move: scale * w for move, w in right.items()},
             )
+            # Dofs solved for earlier that contain the pivot get its solution in its place.
             for follower in followers.pop(pivot, ()):
                 of, by = solved[follower]
                 weight = of.pop(pivot)
@@ -115,11 +117,13 @@ def eliminated(
 
 
 def _add(to: dict[Any, float], terms: dict[Any, float], weight: float) -> None:
+    """Add weighted terms to a sum, both given as {unknown: coefficient}."""
     for key, value in terms.items():
         to[key] = to.get(key, 0.0) + weight * value
 
 
 def _moves_of(group: Equations, number_of_move: Any) -> dict[tuple[int, int], float]:
+    """Return the right side of the equations of a tie, {(number of its move, axis): weight}; empty without a move."""
     if group.move is None:
         return {}
     number = number_of_move(group.move)
@@ -127,6 +131,7 @@ def _moves_of(group: Equations, number_of_move: Any) -> dict[tuple[int, int], fl
 
 
 def _dof(vertex: int, group: Equations, frames: Frames) -> tuple[int, float]:
+    """Return the dof of a vertex along the direction of a tie, and its sign; raise ValueError if there is none."""
     found = frames.along(vertex, group.direction)
     if found is None:
         along = ", ".join(f"{value:g}" for value in group.direction)

@@ -124,11 +124,12 @@ def write_page(
     if not style.show_field:
         states = [replace(state, flux_density=None, fields=()) for state in states]
     fields = _sources(states, size)
+    # How many numbers a state stores: positions, arrows, scalars that change, surroundings, and arrows of the field.
     numbers = 3 * mesh.n_vertices + 6 * count + sum(len(s.values[0]) for s in scalars if not _is_constant(s))
     numbers += surroundings.numbers_per_state
     numbers += max((6 * len(field.starts) for field in fields[0] if field is not None), default=0)
     history = page_history(what, probes, positions)
-    if history is not None:  # curves have four bytes a number
+    if history is not None:  # `along` and each curve: four bytes a number, times 4/3 in base64
         size_limit = max(size_limit - 16 / 3 * len(states) * (1 + len(history[2])), 1.0)
     dtype, chosen = _choose_states(len(states), numbers, size_limit)
     seen = view_of(states, view)
