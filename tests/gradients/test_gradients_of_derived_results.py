@@ -219,3 +219,22 @@ def test_results_of_warm_starts_have_the_slopes_of_differences():
     warm = ms.WarmStart(SPRUNG, solver=EXACT)
     warm(values={STRING: {"stiffness": 1.9}})
     compare(lambda each: warm(values={STRING: {"stiffness": each}})[STRING].tension, np.array(2.0))
+
+
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
+@pytest.mark.parametrize("kind", [ms.Prismatic, ms.Screw])
+def test_rates_of_joints_have_the_slopes_of_differences(kind, integrator):
+    """Check a link that slides on a turning one: velocities are along its axis to the order of the integrator only."""
+    arm = ms.Link(mass=1.0, center=(0.5, 0, 0), inertia=0.1)
+    bob = ms.Link(mass=0.5, center=(1.2, 0.1, 0), inertia=0.05)
+    own = {"pitch": 0.1} if kind is ms.Screw else {}
+    hinge = ms.Revolute(arm, origin=(0, 0, 0), axis=(0.1, 1, 0.2), rate=3.0)
+    slide = kind(bob, arm, origin=(1, 0, 0), axis=(1, 0.2, 0.1), spring_stiffness=50.0, rate=1.0, **own)
+    scene = ms.Scene(ms.Skeleton([arm, bob], [hinge, slide]), gravity=(0, 1.0, -9.81))
+
+    def rates(axis):
+        values = {slide: {"axis": axis}}
+        options = {"steps": 5, "time_step": 0.02, "integrator": integrator, "solver": EXACT}
+        return ms.simulate(scene, values=values, **options)[slide].rate
+
+    compare(rates, np.array((1.0, 0.2, 0.1)))

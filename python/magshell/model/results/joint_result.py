@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._input.tensors import detached
+from ..._input.tensors import as_operand, detached
 from ..._runtime.frozen import Frozen
 from ..rigid.joint_table import JOINTS
 from ..rigid.joints import Joint
@@ -45,7 +45,7 @@ class JointResult(Frozen):
         if spec.freedoms == 3:
             trace = rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2]
             return 2.0 * xp.arcsin(xp.sqrt(xp.clip(0.25 * (3.0 - trace), 0.0, 1.0)))
-        axis = _like(self._axis, rotation)
+        axis = as_operand(self._axis, rotation)
         # R = cos I + sin [a] + (1 - cos) a a^T
         twice_sine = sum(
             axis[..., k] * (rotation[..., (k + 2) % 3, (k + 1) % 3] - rotation[..., (k + 1) % 3, (k + 2) % 3])
@@ -56,7 +56,9 @@ class JointResult(Frozen):
         if not self.joint._pitch:
             return _unwrapped(angle)
         numbers = detached(self._displacement) / self._at_states("pitch")
-        return angle + _like(2.0 * np.pi * np.round((numbers - detached(angle)) / (2.0 * np.pi)), rotation)
+        return angle + as_operand(
+            2.0 * np.pi * np.round((numbers - detached(angle)) / (2.0 * np.pi)), rotation
+        )
 
     @property
     def displacement(self) -> Computed:
@@ -67,7 +69,7 @@ class JointResult(Frozen):
 
     @property
     def _displacement(self) -> Computed:
-        along = _like(self._axis, self._child.center)
+        along = as_operand(self._axis, self._child.center)
         if self._parent is not None:
             along = _rotated(self._parent.rotation, along)
         return (along * (self.place - self._position_on(self._parent))).sum(-1)
@@ -84,7 +86,7 @@ class JointResult(Frozen):
         if spec.freedoms == 3:
             turning = self._child.angular_velocity
             return turning if self._parent is None else turning - self._parent.angular_velocity
-        axis, spin = _like(self._axis, self._child.center), 0.0
+        axis, spin = as_operand(self._axis, self._child.center), 0.0
         velocity = self._velocity_of(self._child) - self._velocity_of(self._parent)
         if self._parent is not None:
             axis, spin = _rotated(self._parent.rotation, axis), self._parent.angular_velocity
@@ -133,12 +135,14 @@ class JointResult(Frozen):
         return ((self.place - self._position_on(self._parent)) ** 2).sum(-1) ** 0.5
 
     @property
-    def _axis(self) -> np.ndarray:
+    def _axis(self) -> Computed:
         """The axis of the joint at rest, (3,), or (n, 3) if the states of the result have different ones.
 
-        Results depend on it through the positions of the links only, so it needs no gradient of its own.
+        A tensor if the solve was given one. Positions obey the joint to round-off, so that angles depend on the axis through
+        them only. Velocities obey it to the order of the integrator, so that rates depend on it directly as well.
         """
-        return self._at_states("axis")
+        given = self._result._tensors_at(0).get((self.joint, "axis"))
+        return self._at_states("axis") if given is None else given / (given**2).sum() ** 0.5
 
     def _at_states(self, name: str) -> np.ndarray:
         """Return a number of the joint; with a row for each state of the result if they have different ones."""
@@ -160,9 +164,9 @@ class JointResult(Frozen):
 
     def _position_on(self, link: RigidBodyResult | None):
         if link is None:
-            return _like(self.joint.origin, self._child.center)
+            return as_operand(self.joint.origin, self._child.center)
         middle = link._points.center
-        return link.center + link.rotation @ _like(self.joint.origin - middle, link.center)
+        return link.center + link.rotation @ as_operand(self.joint.origin - middle, link.center)
 
     def __repr__(self) -> str:
         return f"{type(self._result).__name__} of {self.joint!r}"
@@ -173,13 +177,9 @@ def _rotated(rotations, vectors):
     return (rotations * vectors[..., None, :]).sum(-1)
 
 
-def _like(array: np.ndarray, other):
-    return array if isinstance(other, np.ndarray) else other.new_tensor(array)
-
-
 def _unwrapped(angle):
     """Return angles unwrapped over the first axis, if there is one."""
     if angle.ndim == 0:
         return angle
     numbers = angle if isinstance(angle, np.ndarray) else angle.detach().numpy()
-    return angle + _like(np.unwrap(numbers, axis=0) - numbers, angle)
+    return angle + as_operand(np.unwrap(numbers, axis=0) - numbers, angle)

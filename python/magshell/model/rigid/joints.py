@@ -284,7 +284,8 @@ class Revolute(Joint):
     lower_limit, upper_limit, limit_stiffness, limit_smoothing: rad, rad, N m/rad and rad. Beyond a limit, a torque grows
         like a parabola over the length of the smoothing, then linearly with the stiffness.
     motor_angle: rad, the angle that a motor prescribes, reached by the shorter way round; it excludes a torque, a servo and
-        limits. `result[hinge].motor_torque` is the torque of the motor, of second order in the time step in motions.
+        limits. `result[hinge].motor_torque` is the torque of the motor. In motions by TRBDF2 it is of second order in the
+        time step if the angle is a function of the time, and of first order if it is an array, whose rate is one a step.
     rate: rad/s, the rate of the angle at the start of a motion from rest positions, in a tree without vertices.
 
     A solve may replace all of them, the links being the same at rest. The gradient with respect to the axis is
