@@ -31,7 +31,8 @@ void add_effort(StaticsResult& result, const StaticsResult& earlier) {
     result.load_steps += earlier.load_steps;
     result.relaxation_steps += earlier.relaxation_steps;
     result.saddles_escaped += earlier.saddles_escaped;
-    result.symmetric_saddles += earlier.symmetric_saddles;
+    result.other_branches.insert(result.other_branches.begin(), earlier.other_branches.begin(),
+                                 earlier.other_branches.end());
     result.linear_time += earlier.linear_time;
 }
 
@@ -155,6 +156,11 @@ void register_statics(py::module_& module) {
         .def_readonly("negative_pivots", &SolveStep::negative_pivots)
         .def_readonly("failure", &SolveStep::failure);
 
+    py::class_<OtherBranch>(module, "OtherBranch")
+        .def_readonly("saddle", &OtherBranch::saddle)
+        .def_readonly("state", &OtherBranch::state)
+        .def_readonly("other_mode", &OtherBranch::other_mode);
+
     py::class_<StaticsResult>(module, "StaticsResult")
         .def_readonly("outcome", &StaticsResult::outcome)
         .def_readonly("state", &StaticsResult::state)
@@ -171,7 +177,7 @@ void register_statics(py::module_& module) {
         .def_readonly("load_steps", &StaticsResult::load_steps)
         .def_readonly("relaxation_steps", &StaticsResult::relaxation_steps)
         .def_readonly("saddles_escaped", &StaticsResult::saddles_escaped)
-        .def_readonly("symmetric_saddles", &StaticsResult::symmetric_saddles)
+        .def_readonly("other_branches", &StaticsResult::other_branches)
         .def_readonly("residual", &StaticsResult::residual)
         .def_readonly("at_roundoff", &StaticsResult::at_roundoff)
         .def_readonly("stable", &StaticsResult::stable)

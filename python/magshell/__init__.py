@@ -151,6 +151,7 @@ from .solve.options import (
     Newton,
     ProjectiveDynamics,
 )
+from .solve.statics.branch import Branch
 from .solve.statics.critical_point import CriticalPoint
 from .solve.statics.energies_at import energies, energy, forces, free_motions, hessian
 from .solve.statics.equilibria import EquilibriumSet
@@ -176,6 +177,7 @@ __all__ = [
     "Ball",
     "BodyContact",
     "BodyResult",
+    "Branch",
     "Buckling",
     "Cavity",
     "Clamp",

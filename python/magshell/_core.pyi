@@ -30,6 +30,7 @@ __all__: list[str] = [
     "MotionResult",
     "NewtonOptions",
     "Obstacle",
+    "OtherBranch",
     "Outcome",
     "PathOptions",
     "PathPoint",
@@ -780,6 +781,14 @@ class SolveStep:
     @property
     def negative_pivots(self) -> int: ...
 
+class OtherBranch:
+    @property
+    def other_mode(self) -> bool: ...
+    @property
+    def saddle(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
+    def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+
 class StaticsResult:
     def add_effort_of(self, earlier: StaticsResult) -> None:
         """
@@ -818,6 +827,8 @@ class StaticsResult:
     @property
     def n_negative_eigenvalues(self) -> int: ...
     @property
+    def other_branches(self) -> list[OtherBranch]: ...
+    @property
     def outcome(self) -> Outcome: ...
     @property
     def reason(self) -> str: ...
@@ -831,8 +842,6 @@ class StaticsResult:
     def stable(self) -> bool: ...
     @property
     def state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
-    @property
-    def symmetric_saddles(self) -> int: ...
 
 class PathPoint:
     @property

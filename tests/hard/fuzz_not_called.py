@@ -39,6 +39,7 @@ NOT_CALLED = {
     "EquilibriumPath": "a result",
     "envs.EnvState": "a result",
     "Picture": "a result",
+    "Branch": "a result",
     "ContactState": "a result",
     "Reaction": "a result",
     "Trajectory": "a result",

@@ -373,6 +373,7 @@ def found_results(given: Arrays, made: dict[str, object]) -> dict[str, object]:
         "equilibria": ms.EquilibriumSet([rest, rest]),
         "batch of motions": moves,
         "batch": ms.equilibrium(scene, **asked, batch=2),
+        "branch": ms.Branch(mesh.rest_positions + 0.0, mesh.rest_positions + 1e-3, "other side"),
         "log of a solve": rest.log,
         "step of a solve": rest.log[0],
         "trajectory": move,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "magshell/linalg/dense_decompositions.h"
 
@@ -84,26 +85,29 @@ std::vector<Mode> modes_near_zero(Newton& newton, int count) {
     return modes;
 }
 
-Mode most_unstable_mode(Newton& newton, const VectorXd& q, const LoadParameters& load_parameters,
-                        Index negative_pivots) {
+std::vector<Mode> most_unstable_modes(Newton& newton, const VectorXd& q,
+                                      const LoadParameters& load_parameters, Index negative_pivots) {
     // Modes computed at most, and beyond the number of negative pivots; see test_all_unstable_directions_are_counted.
     constexpr Index most = 12, spare = 6;
     const int count = std::min(negative_pivots, most) + spare;
     std::vector<Mode> modes = modes_near_zero(newton, count);
-    if (modes.front().eigenvalue < 0.0 || negative_pivots == 0) return modes.front();
+    if (modes.front().eigenvalue < 0.0 || negative_pivots == 0) {
+        if (modes.size() > 2) modes.resize(2);
+        return modes;
+    }
 
     // Many stable modes have eigenvalues nearer to zero. A shift makes all of them positive; the most unstable mode is then the nearest.
     double shift = std::max(std::abs(modes.front().eigenvalue), std::abs(modes.back().eigenvalue));
     Eigen::MatrixXd no_moves(q.size(), 0);
     for (FactorReport factor; !factor.succeeded || factor.negative_pivots > 0;) {
         shift *= 4.0;
-        if (!std::isfinite(shift)) return modes.front();
+        if (!std::isfinite(shift)) return {modes.front()};
         const VectorXd weights = shift * newton.model().metric();
         factor = newton.factorize(q, load_parameters, false, {&weights, &q}, no_moves);
     }
     Mode mode = modes_near_zero(newton, 1).front();
     mode.eigenvalue -= shift;
-    return mode;
+    return {std::move(mode)};
 }
 
 }  // namespace magshell

@@ -18,8 +18,9 @@ Eigen::MatrixXd generic_vectors(Index rows, Index columns);
 std::vector<Mode> modes_near_zero(Newton& newton, int count);
 
 /// Returns the mode with the most negative eigenvalue at q, where the model was evaluated last and the factorization has this number of
-/// negative pivots; without negative pivots, the lowest mode. May leave the factorization of a shifted Hessian behind.
-Mode most_unstable_mode(Newton& newton, const VectorXd& q, const LoadParameters& load_parameters,
-                        Index negative_pivots);
+/// negative pivots, and the mode with the next eigenvalue where it was computed as well; without negative pivots, the lowest modes. May
+/// leave the factorization of a shifted Hessian behind.
+std::vector<Mode> most_unstable_modes(Newton& newton, const VectorXd& q,
+                                      const LoadParameters& load_parameters, Index negative_pivots);
 
 }  // namespace magshell

@@ -338,7 +338,8 @@ class Statics {
         }
         result_.relaxation_steps += report.steps;
         result_.saddles_escaped += report.saddles_escaped;
-        result_.symmetric_saddles += report.symmetric_saddles;
+        result_.other_branches.insert(result_.other_branches.end(), report.other_branches.begin(),
+                                      report.other_branches.end());
         if (!report.converged) {
             newton_.model().set_angle_branches(result_.angle_branches);
             result_.reason = report.reason;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "magshell/solve/globalization/obstacle_sides.h"
+#include "magshell/solve/globalization/proximal_continuation.h"
 #include "magshell/solve/newton/newton.h"
 #include "magshell/solve/solve_log.h"
 
@@ -47,7 +48,7 @@ struct StaticsResult {
     std::vector<SolveStep> log;  // of all steps; their factorizations and iterations sum to those below
     int iterations = 0, factorizations = 0, failed_factorizations = 0, load_steps = 0, relaxation_steps = 0;
     int saddles_escaped = 0;
-    int symmetric_saddles = 0;  // of these: those with equal decreases of the energy on both sides
+    std::vector<OtherBranch> other_branches;  // of all saddles that were left
     double residual = 0.0;
     bool at_roundoff =
         false;  // the residual is within round-off, but not within the tolerance relative to the forces that cancel

@@ -54,14 +54,6 @@ def test_a_strip_that_buckles_is_seen_to_leave_a_saddle() -> None:
     assert descent[-1] < descent[0]
 
 
-def test_equal_sides_of_a_saddle_are_told() -> None:
-    tie = ms.equilibrium(compressed())
-    assert tie.symmetric_saddles >= 1 and "ms.find_equilibria" in repr(tie)
-    scene = compressed(gravity=(0, 0, -9.81))
-    heavy = ms.equilibrium(scene)
-    assert heavy.symmetric_saddles == 0 and "ms.find_equilibria" not in repr(heavy)
-
-
 def test_the_table_has_a_line_for_each_step() -> None:
     result = ms.equilibrium(compressed())
     lines = repr(result.log).splitlines()

@@ -75,8 +75,9 @@ class ProximalContinuation {
         }
         if (!crossing_reason_.empty()) report_.reason += "; " + crossing_reason_;
         if (factor.negative_pivots == 0) return;
-        Mode mode = most_unstable_mode(newton_, q_, load_parameters_, factor.negative_pivots);
-        if (mode.eigenvalue < 0.0) report_.descent_direction = std::move(mode.shape);
+        const std::vector<Mode> modes =
+            most_unstable_modes(newton_, q_, load_parameters_, factor.negative_pivots);
+        if (modes.front().eigenvalue < 0.0) report_.descent_direction = modes.front().shape;
     }
 
     // Factorizes at q and computes the Newton step. Returns false if the descent is finished; the report says how.
@@ -117,10 +118,12 @@ class ProximalContinuation {
         }
         solved_ = false;
         if (factor_.succeeded && at_rest) {
-            const Mode mode = most_unstable_mode(newton_, q_, load_parameters_, factor_.negative_pivots);
+            const std::vector<Mode> modes =
+                most_unstable_modes(newton_, q_, load_parameters_, factor_.negative_pivots);
+            const double lowest = modes.front().eigenvalue;
             // A shift above the size of the most negative eigenvalue makes H + shift M positive definite.
-            shift_ = std::max(shift_, step_factor * std::abs(mode.eigenvalue));
-            if (mode.eigenvalue < 0.0) leave_saddle(mode);
+            shift_ = std::max(shift_, step_factor * std::abs(lowest));
+            if (lowest < 0.0) leave_saddle(modes);
             newton_.evaluate(q_, load_parameters_, {});
         } else if (shift_ == 0.0) {
             raise_shift(largest_factor);
@@ -277,44 +280,52 @@ class ProximalContinuation {
         return true;
     }
 
-    // Displaces q along the mode as far as the energy falls, on the side where it falls deeper. Where round-off hides that it falls,
-    // the displacement is the shortest one.
-    void leave_saddle(const Mode& mode) {
-        struct Side {
-            VectorXd q;
-            double energy;
-        };
+    struct Side {
+        VectorXd q;
+        double energy;
+    };
+
+    // Returns the state at which a displacement of q along `shape` ends, if the energy falls on this way or round-off hides that it
+    // falls: as far as it falls, and else the shortest displacement.
+    Side down_along(const VectorXd& shape) {
         const auto at = [&](double amplitude) {
             Side side{q_, std::numeric_limits<double>::infinity()};
-            const VectorXd push = amplitude * mode.shape;
+            const VectorXd push = amplitude * shape;
             if (model_.capabilities().admissible_step_length(q_, push) < 1.0) return side;
             model_.dof_map().retract(side.q, push);
             if (!crosses_obstacle(side.q)) side.energy = model_.energy(side.q, load_parameters_);
             return side;
         };
-        const auto down = [&](double sign) {
-            // A straight displacement stretches a thin shell, so the first one may have to be very short.
-            double amplitude = settled_;
-            Side side = at(sign * amplitude);
-            while (!(side.energy < energy_) && amplitude > hidden_part * settled_)
-                side = at(sign * (amplitude *= small_part));
-            for (amplitude *= step_factor; amplitude < model_.extent(); amplitude *= step_factor) {
-                Side next = at(sign * amplitude);
-                if (!(next.energy < side.energy)) break;
-                side = std::move(next);
-            }
-            return side;
-        };
+        // A straight displacement stretches a thin shell, so the first one may have to be very short.
+        double amplitude = settled_;
+        Side side = at(amplitude);
+        while (!(side.energy < energy_) && amplitude > hidden_part * settled_)
+            side = at(amplitude *= small_part);
+        for (amplitude *= step_factor; amplitude < model_.extent(); amplitude *= step_factor) {
+            Side next = at(amplitude);
+            if (!(next.energy < side.energy)) break;
+            side = std::move(next);
+        }
+        return side;
+    }
+
+    // Displaces q along the lowest mode, on the side where the energy falls deeper. Notes the ways not taken where round-off decides:
+    // the other side where the energy falls equally, and the next mode if its eigenvalue is equal within settled_step.
+    void leave_saddle(const std::vector<Mode>& modes) {
         ++report_.saddles_escaped;
         stationary_ = false;
-        report_.descent_direction = mode.shape;
-        const Side one = down(1.0);
+        report_.descent_direction = modes.front().shape;
+        const Side one = down_along(modes.front().shape);
         // Contact ends every displacement early on both sides, so that depths cannot be compared.
         const bool compared = !(model_.capabilities().has_barrier && std::isfinite(one.energy));
-        const Side other = compared ? down(-1.0) : one;
+        const Side other = compared ? down_along(-modes.front().shape) : one;
         const double equal = hidden_part * (energy_ - one.energy) + energy_tolerance * std::abs(energy_);
         const bool deeper = one.energy - other.energy > equal;
-        if (compared && std::abs(one.energy - other.energy) <= equal) ++report_.symmetric_saddles;
+        if (compared && std::abs(one.energy - other.energy) <= equal)
+            report_.other_branches.push_back({q_, other.q, false});
+        if (modes.size() > 1 && modes[1].eigenvalue <= (1.0 - settled_step) * modes[0].eigenvalue)
+            if (Side next = down_along(modes[1].shape); std::isfinite(next.energy))
+                report_.other_branches.push_back({q_, std::move(next.q), true});
         const Side& better = deeper || !std::isfinite(one.energy) ? other : one;
         if (!std::isfinite(better.energy)) return;
         const double displacement = length(better.q - q_);

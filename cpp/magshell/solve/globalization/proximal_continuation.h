@@ -16,17 +16,24 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "magshell/solve/newton/newton.h"
 #include "magshell/solve/solve_log.h"
 
 namespace magshell {
 
+/// A way out of a saddle that a descent did not take, though round-off decided between it and the way taken.
+struct OtherBranch {
+    VectorXd saddle, state;  // the saddle, and a state of lower energy on that way
+    bool other_mode;         // whether it follows another mode, or the other side of the same one
+};
+
 struct RelaxationReport {
     bool converged = false;
     bool neutral = false;  // stationary, with a singular Hessian
     int steps = 0, saddles_escaped = 0;
-    int symmetric_saddles = 0;  // of these: those with equal decreases of the energy on both sides
+    std::vector<OtherBranch> other_branches;
     double residual = 0.0;
     FactorReport factor;             // of the Hessian at the end, if converged
     double last_displacement = 0.0;  // [m], of the last accepted step

@@ -22,6 +22,7 @@ from ...model.scene.values import Values
 from ...model.shells.strains import Largest, strains_of
 from ...model.supports.displacement_ties import Periodic
 from ...model.supports.supports import Clamp, Pin, SymmetryPlane
+from .branch import Branch
 from .magnetic_state import MagneticState
 from .solve_log import SolveLog, SolveStep
 
@@ -46,9 +47,8 @@ class Equilibrium(SaveMixin, OfOneBody):
     residual: relative to the forces that cancel in it, and to their round-off. at_roundoff: whether round-off ended the
         solve above the solver's tolerance, which happens for very thin sheets and long chains.
     saddles_escaped: the number of unstable states that the solve left along their lowest modes. symmetric_saddles: the
-    number
-        of those where the energy falls equally on both sides, within 1e-6 of its decrease. The solve then took the side on
-        which the largest displacement of the mode is positive; ms.find_equilibria finds the other equilibria.
+        number of those where the energy falls equally on both sides, within 1e-6 of its decrease. The solve then took the
+        side on which the largest displacement of the mode is positive; `branches` has starts for the other side.
     load_fraction: the share of the change of the load parameters that was reached, 1 unless a solve failed.
     largest_membrane_strain, largest_bending_strain: the largest magnitudes in `strains`. Beyond 0.2 the material law is not
         valid, and ms.LargeStrainWarning warns.
@@ -86,6 +86,9 @@ class Equilibrium(SaveMixin, OfOneBody):
     _own_points: Any = field(repr=False, default=None)  # (10 a rigid part, 3)
     _driving: Any = field(repr=False, default=None)  # (m,) N m or N, of motors in joints, in the core's order
     _steps: tuple[tuple[Any, ...], ...] = field(repr=False, default=())  # as in SolveStep
+    _branches: tuple[tuple[Any, ...], ...] = field(
+        repr=False, default=()
+    )  # saddle and state in the core, cause
     _inputs: Any = field(repr=False, default=None)  # the Inputs, if tensors are among them
     _rest: Any = field(repr=False, default=None)  # (n_v, 3) m, the rest positions, if a tensor was given
 
@@ -137,6 +140,20 @@ class Equilibrium(SaveMixin, OfOneBody):
     def log(self) -> SolveLog:
         """The steps of the solve and what each of them cost, as SolveLog: `print(result.log)` shows a table."""
         return SolveLog(tuple(SolveStep(*step) for step in self._steps))
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """The ways out of unstable states that round-off decided against, each with a start for the equilibrium there.
+
+        Empty if nothing was decided by round-off where the solve left an unstable state. A load step that goes past a
+        bifurcation without coming to rest at it is not told.
+        """
+        n_v, points = self.scene.mesh.n_vertices, self.scene._model.points
+        with self._values.in_core():
+            return tuple(
+                Branch(points(saddle)[:n_v], points(state)[:n_v], cause)
+                for saddle, state, cause in self._branches
+            )
 
     def strains(self) -> Any:
         """Return the principal strains of all faces of the shells, as Strains; with one solid alone, those of result[solid].
@@ -199,8 +216,9 @@ class Equilibrium(SaveMixin, OfOneBody):
         crossings = describe_self_intersections(self.scene.mesh, np.asarray(detached(self.positions))[None])
         extra = f", {self.saddles_escaped} saddles left" if self.saddles_escaped else ""
         tie = (
-            "\n  the energy fell equally on both sides of a saddle: ms.find_equilibria finds the other equilibria"
-            if self.symmetric_saddles
+            "\n  round-off decided how an unstable state was left: result.branches has starts for the other ways, "
+            "and ms.find_equilibria finds the other equilibria"
+            if self._branches
             else ""
         )
         extra += f", {self.relaxation_steps} relaxation steps" if self.relaxation_steps else ""

@@ -291,7 +291,7 @@ def _result(
         load_steps=found.load_steps,
         relaxation_steps=found.relaxation_steps,
         saddles_escaped=found.saddles_escaped,
-        symmetric_saddles=found.symmetric_saddles,
+        symmetric_saddles=sum(not each.other_mode for each in found.other_branches),
         residual=found.residual,
         at_roundoff=found.at_roundoff,
         load_fraction=found.load_fraction,
@@ -308,6 +308,10 @@ def _result(
         _own_points=points[n_v:] if scene.rigid_parts else None,
         _driving=driving,
         _steps=steps_of(found),
+        _branches=tuple(
+            (each.saddle, each.state, "other mode" if each.other_mode else "other side")
+            for each in found.other_branches
+        ),
         _inputs=inputs if inputs.given else None,
         _rest=inputs.given_rest,
     )
