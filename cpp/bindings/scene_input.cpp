@@ -44,6 +44,20 @@ std::vector<TiedDof> tied_of(const py::list& given) {
     return tied;
 }
 
+Vec3 to_vec3(const py::handle& given) {
+    const Array numbers = given.cast<Array>();
+    return {numbers.at(0), numbers.at(1), numbers.at(2)};
+}
+
+std::vector<RoundInput> rounds_of(const py::handle& given) {
+    std::vector<RoundInput> rounds;
+    for (const py::handle each : given)
+        rounds.push_back({each["shape"].cast<Index>(), each["obstacle"].cast<Index>(),
+                          to_vec3(each["middle"]), to_vec3(each["half"]), each["radius"].cast<double>(),
+                          each["crown"].cast<double>()});
+    return rounds;
+}
+
 std::vector<ContactInput> contacts_of(const py::list& given) {
     std::vector<ContactInput> contacts;
     for (const py::handle each : given) {
@@ -51,6 +65,7 @@ std::vector<ContactInput> contacts_of(const py::list& given) {
         contact.obstacles = each["obstacles"].cast<std::vector<Index>>();
         contact.has_friction = each["rubs"].cast<bool>();
         contact.lagged = each["lagged"].cast<bool>();
+        contact.rounds = rounds_of(each["rounds"]);
         const IndexArray vertices = each["vertices"].cast<IndexArray>();
         const Array weights = each["weights"].cast<Array>();
         for (py::ssize_t p = 0; p < vertices.shape(0); ++p)
@@ -146,11 +161,6 @@ std::vector<RigidInput> rigid_of(const py::list& given) {
                          each["vertices"].cast<std::vector<Index>>(), each["magnetic"].cast<bool>(),
                          each["has_force"].cast<bool>(), each["has_torque"].cast<bool>()});
     return rigid;
-}
-
-Vec3 to_vec3(const py::handle& given) {
-    const Array numbers = given.cast<Array>();
-    return {numbers.at(0), numbers.at(1), numbers.at(2)};
 }
 
 std::vector<SkeletonInput> skeletons_of(const py::list& given) {

@@ -85,6 +85,15 @@ def _in_scenes(s: Sample) -> Iterator[Call]:
         "face_samples": 1,
     }
     yield Call("Contact", lambda **a: moved(contacts=ms.Contact(**a)), touch)
+    body = ms.RigidBody(mass=1e-3, inertia=1e-8, center=(0, 0, 0.01), velocity=(0, 0, -0.1))
+    ball = obstacles.Attached(obstacles.Sphere(0.01, center=(0, 0, 0.01)), to=body)
+
+    def rolled(**a):
+        scene = ms.Scene(body, contacts=ms.Contact(**a), allow_rigid_motions=True)
+        return ms.simulate(scene, steps=1, time_step=1e-3, progress=False)
+
+    of_shapes = {"obstacles": [obstacles.Plane()], "shapes": [ball], "friction_coefficient": 0.5}
+    yield Call("Contact of shapes", rolled, of_shapes)
     other = ms.Shell(
         s.mesh.transformed(translation=(0, 0, 5e-3)), thickness=1e-3, young_modulus=1e6, mass_density=1e3
     )

@@ -29,6 +29,7 @@ from gradient_kinds_muscles import muscles_at_rest, muscles_in_motion
 from gradient_kinds_near_magnets import near_magnets
 from gradient_kinds_own_field import bodies_with_own_field, own_field
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
+from gradient_kinds_round import ROUND_MAKERS
 from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
 from gradient_kinds_skeletons import (
     motorized_skeleton_at_rest,
@@ -395,6 +396,7 @@ MAKERS = {
     "susceptible shells in motion": lambda: susceptible_shells(True),
     **LINEAR_MAKERS,
     **ATTACHED_MAKERS,
+    **ROUND_MAKERS,
     **BATCH_MAKERS,
     "on springs between points at rest": lambda: on_springs_at_rest(foundations=False),
     "on springs between points in motion": lambda: on_springs_in_motion(

@@ -140,6 +140,9 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
     sampled = ms.SampledField(given([-1.0, -1, -1]), given([2.0, 2, 2]), given(np.ones((2, 2, 2, 3))))
     ball = ms.meshes.spherical_cap(0.1, 0.0, np.pi, cells=(8, 4))
     place = {"center": given([0, 0, -0.1]), "rotation": given([0, 0.1, 0])}
+    attached = ms.obstacles.Attached(
+        ms.obstacles.Sphere(0.1), ms.RigidBody(mass=1.0, inertia=1.0), center=given([0, 0, 1.0])
+    )
     found = {
         "pin": ms.Pin(
             given.numbers(0, 3),
@@ -180,6 +183,7 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
         "tendon": ms.Tendon(given([[0.0, 0.0, 0.0], [0.04, 0.0, 0.0]]), solid, tension=0.1),
         "crease": ms.Crease(given(flat.interior_edges[:2], np.int64), given([1e-5, 2e-5])),
         "contact": ms.Contact([plane], vertices=given.numbers(0, 1)),
+        "contact of shapes": ms.Contact(plane, shapes=[attached]),
         "body contact": ms.Contact(shell, other),
         "self contact": ms.SelfContact(shell),
         "uniform": ms.UniformField(),
@@ -198,9 +202,7 @@ def _around(given: Arrays, bodies: dict[str, object]) -> dict[str, object]:
         "plane": plane,
         "sphere": ms.obstacles.Sphere(0.1, **place),
         "ellipsoid": ms.obstacles.Ellipsoid(given([0.1, 0.2, 0.1]), **place),
-        "attached": ms.obstacles.Attached(
-            ms.obstacles.Sphere(0.1), ms.RigidBody(mass=1.0, inertia=1.0), center=given([0, 0, 1.0])
-        ),
+        "attached": attached,
         "box": ms.obstacles.Box(given([0.1, 0.1, 0.1]), **place),
         "capsule": ms.obstacles.Capsule(given([[0, 0, 0], [0.1, 0, 0]]), 0.01, **place),
         "tube": ms.obstacles.Tube(given([[0, 0, 0], [0.1, 0, 0], [0.2, 0.1, 0]]), 0.05, **place),

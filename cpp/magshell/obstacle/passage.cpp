@@ -35,17 +35,23 @@ bool holds_origin(const std::array<Vec3, 3>& x) {
     return true;
 }
 
-// Finds where the straight way from a point to another, `length` long, enters a body: steps of the distance's own length
-// cannot miss a surface. False where it stays outside.
-bool enters(const Obstacle& shape, const Vec3& from, const Vec3& to, double length, Distance& at) {
+// Finds where the straight way from a point to another, `length` long, enters a body that is thicker by a radius: steps of the
+// distance's own length cannot miss a surface. False where it stays outside.
+bool enters(const Obstacle& shape, const Vec3& from, const Vec3& to, double length, double radius,
+            Distance& at) {
     constexpr double least_advance = 1e-3;  // [-] of the way, where it runs along the surface
-    at = shape.distance(from);
+    const auto distance = [&](const Vec3& x) {
+        Distance found = shape.distance(x);
+        found.value -= radius;
+        return found;
+    };
+    at = distance(from);
     if (!(at.value > 0.0)) return true;
     if (length <= at.value) return false;
     double travelled = at.value / length;
     while (at.value > 0.0) {
         if (travelled >= 1.0) return false;
-        at = shape.distance(from + travelled * (to - from));
+        at = distance(from + travelled * (to - from));
         travelled += std::max(at.value / length, least_advance);
     }
     return true;
@@ -55,12 +61,12 @@ bool enters(const Obstacle& shape, const Vec3& from, const Vec3& to, double leng
 
 // The sides are those where the way enters, where it leaves and where it ends: the ends tell of a thin body, the exit of one that is
 // hollow.
-bool passes_through(const Obstacle& shape, const Vec3& from, const Vec3& to) {
+bool passes_through(const Obstacle& shape, const Vec3& from, const Vec3& to, double radius) {
     const double length = (to - from).norm();
     Distance in, out;
-    if (!enters(shape, from, to, length, in)) return false;
+    if (!enters(shape, from, to, length, radius, in)) return false;
     if (in.normal.dot(shape.distance(to).normal) < opposite) return true;
-    return enters(shape, to, from, length, out) && in.normal.dot(out.normal) < opposite;
+    return enters(shape, to, from, length, radius, out) && in.normal.dot(out.normal) < opposite;
 }
 
 bool sweeps_over(const std::array<Vec3, 3>& from, const std::array<Vec3, 3>& to, const Vec3& point) {

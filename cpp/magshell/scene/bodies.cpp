@@ -178,7 +178,8 @@ std::vector<std::array<Index, 4>> Bodies::corners_of(const std::vector<Index>& r
     return all;
 }
 
-// Couples every point in contact with the corners of the rigid body that carries the obstacle.
+// Couples every point in contact with the corners of the rigid body that carries the obstacle, and every ball and capsule with its own and
+// with these.
 void Bodies::add_attached_couplings(const SceneInput& input) {
     const std::vector<std::array<Index, 4>> corners = corners_of(input.attached_to);
     for (const ContactInput& contact : input.contacts)
@@ -190,6 +191,12 @@ void Bodies::add_attached_couplings(const SceneInput& input) {
                 for (const Index vertex : point.nodes)
                     if (vertex >= 0) nodes.push_back(nodes_.vertices.core[vertex]);
             }
+    for (const ContactInput& contact : input.contacts)
+        for (const RoundInput& round : contact.rounds) {
+            const std::array<Index, 4>&own = corners[round.shape], &other = corners[round.obstacle];
+            std::vector<Index>& nodes = coupled_.emplace_back(own.begin(), own.end());
+            if (other[0] >= 0) nodes.insert(nodes.end(), other.begin(), other.end());
+        }
 }
 
 std::vector<Stencil> Bodies::stencils(const SceneInput& input) const {

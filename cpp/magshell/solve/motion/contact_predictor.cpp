@@ -37,6 +37,7 @@ VectorXd predict_contact(const Model& model, const VectorXd& q, const LoadParame
     for (const Contacts::ObstaclePoint& touch : contact.obstacle_points(q, load_parameters)) {
         const auto same = std::lower_bound(sorted.begin(), sorted.end(), &touch, before);
         const double force = same != sorted.end() && !before(&touch, *same) ? (*same)->force : 0.0;
+        if (touch.round) continue;  // of rigid bodies, whose vertices are not free
         const ContactPoint& point = contact.point(touch);
         if (point.nodes[1] >= 0) continue;  // the balance of one vertex does not hold for a point on a face
         const ContactLaw& law = contact.law(touch);

@@ -1,11 +1,13 @@
 #include "magshell/terms/contact/contact_term.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
+#include "magshell/core/rotation_vector.h"
 #include "magshell/obstacle/passage.h"
 
 namespace magshell {
@@ -18,6 +20,11 @@ Vec3 weighted(const ContactPoint& point, const double* all) {
     for (int k = 0; k < 3; ++k)
         if (point.nodes[k] >= 0) sum += point.weights[k] * Eigen::Map<const Vec3>(all + 3 * point.nodes[k]);
     return sum;
+}
+
+// The number of parts of an axis between points that are at most a radius apart.
+int axis_parts(const RoundInput& round) {
+    return static_cast<int>(std::ceil(2.0 * round.half.norm() / round.radius));
 }
 
 ContactTerm::AttachedNodes all_nodes(const ContactPoint& point, const CornerFrame& frame) {
@@ -55,6 +62,10 @@ ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
         contact.sticking_speed = number("sticking_speed", "m/s");
         contact.obstacles = given.obstacles;
         contact.points = given.points;
+        contact.rounds = given.rounds;
+        for (const RoundInput& round : contact.rounds)
+            contact.round_slots.push_back(pair_slots<RoundMotion::places>(
+                matrix, RoundMotion::nodes(*frames_[round.shape], frames_[round.obstacle].get())));
         for (ContactPoint& point : contact.points) {
             for (Index& node : point.nodes)
                 if (node >= 0) node = nodes.vertices.core[node];
@@ -140,6 +151,7 @@ std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(
         const Contact& contact = contacts_[c];
         const ContactLaw& law = laws_[c];
         const Index count = static_cast<Index>(contact.points.size());
+        add_active_rounds(static_cast<Index>(c), q, load_parameters, all);
         for (const Index o : contact.obstacles) {
             const ObstacleState obstacle = obstacle_state(o, load_parameters);
             const CornerFrame* const frame = frames_[o].get();
@@ -169,7 +181,62 @@ std::vector<ContactTerm::ActiveContact> ContactTerm::active_contacts(
     return all;
 }
 
+void ContactTerm::add_active_rounds(Index c, const double* q, const LoadParameters& load_parameters,
+                                    std::vector<ActiveContact>& out) const {
+    const Contact& contact = contacts_[c];
+    const ContactLaw& law = laws_[c];
+    for (std::size_t k = 0; k < contact.rounds.size(); ++k) {
+        const RoundInput& given = contact.rounds[k];
+        const ObstacleState obstacle = obstacle_state(given.obstacle, load_parameters);
+        const CornerFrame* const frame = frames_[given.obstacle].get();
+        const CornerFrame::Pose pose = frame ? frame->pose(q) : CornerFrame::Pose();
+        const RoundMotion motion(
+            given, obstacles_[given.shape].placement, *frames_[given.shape], frame,
+            [&](const Vec3& x) -> Distance {
+                if (!frame) return obstacle.distance(x);
+                return RelativeMotion(*frame, pose, x).in_world(obstacle.distance(frame->at_rest(pose, x)));
+            },
+            q);
+        const Distance gap = motion.gap();
+        const double depth = law.offset - gap.value;
+        if (!(depth > 0.0)) continue;
+        const Penalty penalty(depth, law.smoothing);
+        out.push_back({c, given.obstacle, static_cast<Index>(contact.points.size() + k), motion.point(), gap,
+                       law.stiffness * penalty.force, law.stiffness * penalty.stiffness,
+                       law.stiffness * penalty.force_by_smoothing});
+        out.back().round = std::make_shared<RoundMotion>(motion);
+        if (frame) out.back().relative = std::make_shared<RelativeMotion>(*frame, pose, motion.point());
+    }
+}
+
+std::shared_ptr<const ContactTerm::ActiveContact> ContactTerm::on_surface(const ActiveContact& active) {
+    const std::shared_ptr<ActiveContact> there = std::make_shared<ActiveContact>(active);
+    there->round = std::make_shared<RoundMotion>(active.round->on_surface());
+    there->position = there->round->point();
+    return there;
+}
+
+void ContactTerm::add_round_vjp(const ActiveContact& active, const RoundMotion& motion,
+                                const RoundMotion::Slopes& slopes, const ContactLaw& by_friction,
+                                const LoadParameters& load_parameters, Gradient& out) const {
+    const ObstacleState obstacle = obstacle_state(active.obstacle, load_parameters);
+    const Contact& contact = contacts_[active.contact];
+    const Index shape = contact.rounds[active.point - contact.points.size()].shape;
+    Placement by_shape;
+    const RoundMotion::ByObstacle by =
+        motion.vjp(slopes, active.stiffness, obstacles_[shape].placement, by_shape);
+    ObstacleGradient by_obstacle;
+    obstacle_vjp(active, obstacle, by.by_distance, by.by_normal, Vec3::Zero(), by_obstacle);
+    if (!active.relative)
+        obstacle.vjp(motion.point(), {0.0, Vec3::Zero(), Mat3::Zero()}, 0.0, Vec3::Zero(), slopes.by_velocity,
+                     by_obstacle);
+    add_vjp(active, slopes.by_force, by_friction, by_obstacle, out.values, out.load_parameters);
+    out.values.segment<3>(obstacle_slices_[shape].center.first) += by_shape.center;
+    out.values.segment<3>(obstacle_slices_[shape].rotation.first) += by_shape.rotation_vector;
+}
+
 std::string Passage::describe(const Nodes& all) const {
+    if (is_round) return "the shape of a rigid body passes through an obstacle";
     if (nodes[1] < 0)
         return "vertex " + std::to_string(all.user_vertex(nodes[0])) + " passes through an obstacle";
     std::string vertices;
@@ -190,6 +257,21 @@ Passage ContactTerm::passes_through(const VectorXd& q, const LoadParameters& loa
     return passes_between(own_positions(q, load_parameters), own_positions(end, load_parameters_at_end));
 }
 
+std::vector<Vec3> ContactTerm::axis_points(const RoundInput& round, const double* q) const {
+    const Placement& placed = obstacles_[round.shape].placement;
+    const CornerFrame& frame = *frames_[round.shape];
+    const CornerFrame::Pose pose = frame.pose(q);
+    const Mat3 turned = rotation(placed.rotation_vector);
+    const auto at = [&](double t) -> Vec3 {
+        const Vec3 rest = placed.center + turned * (round.middle + t * round.half);
+        return pose.center + pose.axes * (rest - frame.rest_center());
+    };
+    const int parts = axis_parts(round);
+    std::vector<Vec3> points;
+    for (int k = 0; k <= parts; ++k) points.push_back(at(parts == 0 ? 0.0 : 2.0 * k / parts - 1.0));
+    return points;
+}
+
 Vec3 ContactTerm::own_position(Index obstacle, const ObstacleState& at, const VectorXd& q,
                                const Vec3& x) const {
     const CornerFrame* const frame = frames_[obstacle].get();
@@ -203,6 +285,12 @@ std::vector<Vec3> ContactTerm::own_positions(const VectorXd& q, const LoadParame
             const ObstacleState obstacle = obstacle_state(o, load_parameters);
             for (const ContactPoint& point : contact.points)
                 places.push_back(own_position(o, obstacle, q, weighted(point, q.data())));
+        }
+    for (const Contact& contact : contacts_)
+        for (const RoundInput& round : contact.rounds) {
+            const ObstacleState obstacle = obstacle_state(round.obstacle, load_parameters);
+            for (const Vec3& x : axis_points(round, q.data()))
+                places.push_back(own_position(round.obstacle, obstacle, q, x));
         }
     for (const WatchedObstacle& each : watched_) {
         const ObstacleState obstacle = obstacle_state(each.obstacle, load_parameters);
@@ -222,6 +310,12 @@ Passage ContactTerm::passes_between(const std::vector<Vec3>& before, const std::
                     return {{point.nodes[0], -1, -1}};
                 ++k;
             }
+    for (const Contact& contact : contacts_)
+        for (const RoundInput& round : contact.rounds)
+            for (int parts = axis_parts(round); parts >= 0; --parts, ++k)
+                if (magshell::passes_through(*obstacles_[round.obstacle].shape, before[k], after[k],
+                                             round.radius))
+                    return {{frames_[round.shape]->corners()[0], -1, -1}, true};
     for (const WatchedObstacle& each : watched_)
         for (const std::array<Index, 3>& face : each.faces) {
             const std::array<Vec3, 3> from{before[k], before[k + 1], before[k + 2]},
@@ -243,6 +337,7 @@ std::vector<Vec3> ContactTerm::rotation_vectors(const LoadParameters& load_param
 }
 
 Vec3 ContactTerm::at_point(const ActiveContact& active, const double* all) const {
+    if (active.round) return active.round->motion(all);
     const Vec3 at = weighted(point(active), all);
     return active.relative ? at + active.relative->motion(all) : at;
 }
@@ -256,28 +351,42 @@ Mat3 ContactTerm::jacobian(const ActiveContact& active, int place) const {
     return active.relative->jacobian(place - point_nodes);
 }
 
-void ContactTerm::distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const {
+template <class Add>
+void ContactTerm::distribute_to_nodes(const ActiveContact& active, const Vec3& vector, const Add& add) const {
+    if (active.round) {
+        const RoundMotion::Nodes nodes = active.round->nodes();
+        for (int k = 0; k < RoundMotion::places; ++k)
+            if (nodes[k] >= 0) add(nodes[k], active.round->reaction(k, vector));
+        return;
+    }
     const ContactPoint& p = point(active);
     for (int k = 0; k < point_nodes; ++k)
-        if (p.nodes[k] >= 0) out.segment<3>(3 * p.nodes[k]) += p.weights[k] * vector;
+        if (p.nodes[k] >= 0) add(p.nodes[k], Vec3(p.weights[k] * vector));
     for (int k = 0; k < 4 && active.relative; ++k)
-        out.segment<3>(3 * active.relative->corner(k)) += active.relative->reaction(k, vector);
+        add(active.relative->corner(k), active.relative->reaction(k, vector));
+}
+
+void ContactTerm::distribute(const ActiveContact& active, const Vec3& vector, VectorXd& out) const {
+    distribute_to_nodes(active, vector,
+                        [&out](Index node, const Vec3& own) { out.segment<3>(3 * node) += own; });
 }
 
 void ContactTerm::distribute(const ActiveContact& active, const Vec3& force, Residual& out) const {
-    const ContactPoint& p = point(active);
-    const auto add = [&out](Index node, const Vec3& own) {
+    distribute_to_nodes(active, force, [&out](Index node, const Vec3& own) {
         for (int axis = 0; axis < 3; ++axis) out.add(3 * node + axis, own[axis]);
-    };
-    for (int k = 0; k < point_nodes; ++k)
-        if (p.nodes[k] >= 0) add(p.nodes[k], p.weights[k] * force);
-    for (int k = 0; k < 4 && active.relative; ++k)
-        add(active.relative->corner(k), active.relative->reaction(k, force));
+    });
 }
 
 void ContactTerm::add_cancelling_force(const ActiveContact& active, double stiffness, VectorXd& out) const {
-    const ContactPoint& p = point(active);
     const double force = stiffness * active.position.norm();
+    if (active.round) {
+        const RoundMotion::Nodes nodes = active.round->nodes();
+        for (int k = 0; k < RoundMotion::places; ++k)
+            if (nodes[k] >= 0)
+                out.segment<3>(3 * nodes[k]).array() += active.round->jacobian(k).norm() * force;
+        return;
+    }
+    const ContactPoint& p = point(active);
     for (int k = 0; k < point_nodes; ++k)
         if (p.nodes[k] >= 0) out.segment<3>(3 * p.nodes[k]).array() += p.weights[k] * force;
     for (int k = 0; k < 4 && active.relative; ++k)
@@ -290,6 +399,14 @@ void ContactTerm::add_cancelling_normal_forces(VectorXd& out) const {
 }
 
 void ContactTerm::add_block(const ActiveContact& active, const Mat3& block, SystemMatrix& out) const {
+    if (active.round) {
+        std::array<Mat3, RoundMotion::places> jacobians;
+        for (int i = 0; i < RoundMotion::places; ++i) jacobians[i] = active.round->jacobian(i);
+        add_round_blocks(
+            active, [&](int i, int j) -> Mat3 { return jacobians[i].transpose() * block * jacobians[j]; },
+            out);
+        return;
+    }
     const Contact& contact = contacts_[active.contact];
     const ContactPoint& p = point(active);
     if (active.relative) {
@@ -308,6 +425,18 @@ void ContactTerm::add_block(const ActiveContact& active, const Mat3& block, Syst
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j <= i; ++j) blocks[lower_index(i, j)] = to_simd(p.weights[i] * p.weights[j] * block);
     scatter_blocks<3>(out, p.nodes, contact.slots[active.point - contact.first_on_face], blocks, 0);
+}
+
+template <class Block>
+void ContactTerm::add_round_blocks(const ActiveContact& active, const Block& block, SystemMatrix& out) const {
+    constexpr int all = RoundMotion::places;
+    SimdMat3 blocks[all * (all + 1) / 2];
+    const RoundMotion::Nodes nodes = active.round->nodes();
+    for (int i = 0; i < all; ++i)
+        for (int j = 0; j <= i; ++j)
+            if (nodes[i] >= 0 && nodes[j] >= 0) blocks[lower_index(i, j)] = to_simd(block(i, j));
+    const Contact& contact = contacts_[active.contact];
+    scatter_blocks<all>(out, nodes, contact.round_slots[active.point - contact.points.size()], blocks, 0);
 }
 
 template <class Block>
@@ -351,7 +480,9 @@ double ContactTerm::energy(const double* q, const LoadParameters& load_parameter
 
 std::vector<ContactTerm::HardContact> ContactTerm::hard_contacts() const {
     std::vector<HardContact> all;
-    for (std::size_t c = 0; c < contacts_.size(); ++c)
+    for (std::size_t c = 0; c < contacts_.size(); ++c) {
+        if (!contacts_[c].rounds.empty())
+            throw InvalidInput("Coulomb's law node by node is for vertices, not for balls and capsules");
         for (const Index obstacle : contacts_[c].obstacles)
             for (const ContactPoint& p : contacts_[c].points) {
                 if (frames_[obstacle])
@@ -360,11 +491,17 @@ std::vector<ContactTerm::HardContact> ContactTerm::hard_contacts() const {
                     throw InvalidInput("Coulomb's law node by node is for vertices: take face_samples=0");
                 all.push_back({p.nodes[0], obstacle, laws_[c].offset, laws_[c].friction});
             }
+    }
     return all;
 }
 
 void ContactTerm::add_contact_stiffness(VectorXd& of_nodes) const {
     for (const ActiveContact& active : evaluated_contacts_) {
+        if (active.round) {
+            for (const Index node : active.round->nodes())
+                if (node >= 0) of_nodes[node] += 0.25 * active.stiffness;
+            continue;
+        }
         const ContactPoint& p = point(active);
         for (int k = 0; k < 3; ++k)  // row sums of stiffness w w^T
             if (p.nodes[k] >= 0) of_nodes[p.nodes[k]] += p.weights[k] * active.stiffness;
@@ -381,6 +518,13 @@ void ContactTerm::evaluate(const double* q, const LoadParameters& load_parameter
 
 void ContactTerm::finish_assembly(const double*, const LoadParameters&, SystemMatrix& out) const {
     for (const ActiveContact& active : evaluated_contacts_) {
+        if (active.round) {
+            add_round_blocks(
+                active,
+                [&](int i, int j) { return active.round->hessian(i, j, active.force, active.stiffness); },
+                out);
+            continue;
+        }
         const Distance& at = active.at;
         add_block(active, active.stiffness * at.normal * at.normal.transpose() - active.force * at.curvature,
                   out);
@@ -394,6 +538,14 @@ void ContactTerm::vjp(const double*, const LoadParameters& load_parameters, cons
     for (const ActiveContact& active : evaluated_contacts_) {
         const Vec3 along = at_point(active, lambda);
         const double by_force = -along.dot(active.at.normal);
+        if (active.round) {
+            const RoundMotion::Slopes slopes{.by_force = by_force,
+                                             .by_normal = -active.force * along,
+                                             .by_motion = -active.force * active.at.normal,
+                                             .lambda = lambda};
+            add_round_vjp(active, *active.round, slopes, {}, load_parameters, out);
+            continue;
+        }
         ObstacleGradient by_obstacle;
         obstacle_vjp(active, obstacle_state(active.obstacle, load_parameters), -active.stiffness * by_force,
                      -active.force * along, Vec3::Zero(), by_obstacle);
@@ -403,7 +555,8 @@ void ContactTerm::vjp(const double*, const LoadParameters& load_parameters, cons
 
 std::size_t ContactTerm::bytes() const {
     std::size_t total = bytes_of(evaluated_contacts_);
-    for (const Contact& contact : contacts_) total += bytes_of(contact.points) + bytes_of(contact.slots);
+    for (const Contact& contact : contacts_)
+        total += bytes_of(contact.points) + bytes_of(contact.slots) + bytes_of(contact.round_slots);
     return total;
 }
 

@@ -29,14 +29,17 @@ void FrictionTerm::evaluate(const Kinematics& at, const LoadParameters& load_par
                      [&](const ContactTerm::ActiveContact& active, bool lagged, double factor) {
                          const ObstacleState obstacle = contact_.obstacle_state(
                              active.obstacle, lagged ? load_parameters_before_ : load_parameters);
+                         const std::shared_ptr<const ContactTerm::ActiveContact> surface =
+                             active.round ? ContactTerm::on_surface(active) : nullptr;
+                         const ContactTerm::ActiveContact& there = surface ? *surface : active;
                          const Vec3 velocity =
-                             contact_.at_point(active, at.v.data()) - obstacle.velocity(active.position);
+                             contact_.at_point(there, at.v.data()) - obstacle.velocity(there.position);
                          const ContactLaw& law = contact_.law(active);
                          friction_contacts_.push_back(
-                             {&active, lagged, factor, obstacle,
+                             {&active, surface, lagged, factor, obstacle,
                               Friction(active.force, active.at.normal, velocity, law.sticking_speed)});
                          contact_.distribute(
-                             active, -factor * law.friction * friction_contacts_.back().friction.force, out);
+                             there, -factor * law.friction * friction_contacts_.back().friction.force, out);
                      });
 }
 
@@ -46,8 +49,13 @@ void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool po
         const ContactTerm::ActiveContact& active = *each.active;
         const double coefficient = each.factor * contact_.law(active).friction;
         const Mat3& by_velocity = positive_definite ? each.friction.secant : each.friction.by_velocity;
-        contact_.add_block(active, -coefficient * at.rate * by_velocity, out);
+        contact_.add_block(each.point(), -coefficient * at.rate * by_velocity, out);
         if (each.lagged || contacts_.frozen()) continue;
+        if (each.surface) {
+            each.surface->round->add_friction(each.friction, active.stiffness, each.obstacle.spin(),
+                                              -coefficient, at.v, rest);
+            continue;
+        }
         const Mat3 block = -coefficient * by_position(each.friction, active, each.obstacle.spin());
         const ContactPoint& point = contact_.point(active);
         if (active.relative) {
@@ -127,28 +135,39 @@ void FrictionTerm::add_attached(const FrictionContact& each, double factor, cons
     }
 }
 
-void FrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd& lambda,
+void FrictionTerm::vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
                        KinematicsGradient& by, Gradient& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const ContactTerm::ActiveContact& active = *each.active;
         const Friction& friction = each.friction;
         const double coefficient = each.factor * contact_.law(active).friction;
-        const Vec3 along = contact_.at_point(active, lambda.data());
+        const Vec3 along = contact_.at_point(each.point(), lambda.data());
         const Vec3 by_velocity = coefficient * (friction.by_velocity * along);
-        contact_.distribute(active, by_velocity, by.velocity);
+        contact_.distribute(each.point(), by_velocity, by.velocity);
         if (each.lagged) {
             const Mat3 by_begin = coefficient * by_position(friction, active, each.obstacle.spin());
             contact_.distribute(active, by_begin.transpose() * along, by.begin);
         }
         const double by_force = -coefficient * along.dot(friction.by_normal_force);
+        const ContactLaw by_law{.friction = -each.factor * along.dot(friction.force),
+                                .sticking_speed = -coefficient * along.dot(friction.by_sticking_speed)};
+        if (each.surface) {
+            const RoundMotion::Slopes slopes{
+                .by_force = by_force,
+                .by_normal = -coefficient * (friction.by_normal.transpose() * along),
+                .by_velocity = -by_velocity,
+                .by_motion = -coefficient * friction.force,
+                .v = at.v.data(),
+                .lambda = lambda.data(),
+                .spin = each.obstacle.spin()};
+            contact_.add_round_vjp(active, *each.surface->round, slopes, by_law, load_parameters, out);
+            continue;
+        }
         ObstacleGradient by_obstacle;
         ContactTerm::obstacle_vjp(active, each.obstacle, -active.stiffness * by_force,
                                   -coefficient * (friction.by_normal.transpose() * along), -by_velocity,
                                   by_obstacle);
-        contact_.add_vjp(active, by_force,
-                         {.friction = -each.factor * along.dot(friction.force),
-                          .sticking_speed = -coefficient * along.dot(friction.by_sticking_speed)},
-                         by_obstacle, out.values,
+        contact_.add_vjp(active, by_force, by_law, by_obstacle, out.values,
                          each.lagged ? by.begin_load_parameters : out.load_parameters);
     }
 }
@@ -156,7 +175,7 @@ void FrictionTerm::vjp(const Kinematics&, const LoadParameters&, const VectorXd&
 void FrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const double stiffness = at.rate * each.friction.by_velocity.norm();
-        contact_.add_cancelling_force(*each.active,
+        contact_.add_cancelling_force(each.point(),
                                       each.factor * contact_.law(*each.active).friction * stiffness, out);
     }
 }

@@ -32,10 +32,14 @@ class FrictionTerm final : public ForceTerm {
   private:
     struct FrictionContact {
         const ContactTerm::ActiveContact* active;
+        std::shared_ptr<const ContactTerm::ActiveContact> surface;  // of a ball or a capsule, else nullptr
         bool lagged;
         double factor;  // of the coefficient of friction
         ObstacleState obstacle;
         Friction friction;
+
+        /// Returns the contact at whose point friction acts.
+        const ContactTerm::ActiveContact& point() const { return surface ? *surface : *active; }
     };
 
     /// Adds the blocks of factor times the friction of a point and of the rigid body that carries the obstacle, by their positions.

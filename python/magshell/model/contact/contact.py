@@ -18,7 +18,8 @@ from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
 from .body_contact import BodyContact, width_of
-from .obstacles import Obstacle
+from .obstacles import Attached, Obstacle
+from .round_shapes import RoundPair, checked_shapes, round_pairs
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -31,13 +32,17 @@ _FACE_POINTS = {  # barycentric coordinates of the points on a face
 }
 _SMOOTHING = 1e-2  # [-] default smoothing over the mean thickness of sheets
 _SMOOTHING_OF_SOLIDS = 1e-4  # [-] default smoothing over the width, for solids alone
-_STICKING = 1e-2  # [1/s] default sticking speed over the largest body's width
+_SMOOTHING_OF_SHAPES = 1e-3  # [-] default smoothing over the smallest radius of shapes
+_STICKING = (
+    1e-2  # [1/s] default sticking speed over the largest body's width, or the largest diameter of shapes
+)
 
 
 class Contact(Owner):
     """Keeps points of a sheet out of obstacles, with friction if wanted [Chen22, 6.1; Geilinger et al. 2020].
 
-    For two bodies, ms.Contact(a, b, ...) makes a BodyContact, which keeps them out of each other.
+    For two bodies, ms.Contact(a, b, ...) makes a BodyContact, which keeps them out of each other. With `shapes`, rigid balls
+    and capsules touch obstacles and each other.
 
     obstacles: one of ms.obstacles, or several.
     contact_stiffness: N/m, of every point: the force grows linearly with the depth, after a short parabola.
@@ -45,7 +50,8 @@ class Contact(Owner):
     sticking_speed: m/s, the speed bound of static friction (eps_v of IPC). Below it a point sticks: with a fraction r of
         its largest friction force it creeps at sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's
         width per second (of the largest sheet's).
-    smoothing: m, the length of the parabola; by default a hundredth of the thickness, for solids alone 1e-4 of the width.
+    smoothing: m, the length of the parabola; by default a hundredth of the thickness, for solids alone 1e-4 of the width,
+        for shapes a thousandth of the smallest radius.
     offset: m, the distance from the obstacle at which the force begins; with half the thickness the face of the sheet is
         in contact, not its middle surface.
     lagged_friction: take normal forces and normals of friction from the beginning of each step. The matrix stays
@@ -53,6 +59,10 @@ class Contact(Owner):
     vertices: those in contact; by default all, for a solid those on its surface.
     body: the Shell or Solid in contact; by default all, if no vertices are given.
     face_samples: further contact points on every face, 0, 1 or 3, for meshes that are coarse compared to the obstacle.
+    shapes: smooth spheres and capsules that rigid bodies carry, ms.obstacles.Attached objects, which touch the obstacles in
+        place of vertices. Those that are among the obstacles as well touch each other; those of one rigid body do not.
+        Each pair touches at one place, and a capsule at both ends of its axis where it touches a Plane or a hollow.
+        Where it touches a Capsule or a Box its ends are thinner by 5e-4 of its radius. Friction is never lagged.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
@@ -62,6 +72,14 @@ class Contact(Owner):
     >>> move = ms.simulate(scene, steps=50, time_step=1e-3, integrator=ms.ImplicitEuler())
     >>> bool(abs(move.positions[-1, :, 2] + 1e-3).max() < 1e-4)
     True
+
+    >>> body = ms.Link(mass=1e-3, inertia=1e-8, center=(0, 0, 4.9e-3))
+    >>> ball = ms.obstacles.Attached(ms.obstacles.Sphere(5e-3, center=(0, 0, 4.9e-3)), to=body)
+    >>> touch = ms.Contact(ms.obstacles.Plane(), shapes=ball, contact_stiffness=100)
+    >>> rail = ms.Prismatic(body, origin=(0, 0, 0), axis=(0, 0, 1))
+    >>> scene = ms.Scene(ms.Skeleton([body], [rail]), contacts=[touch], gravity=(0, 0, -9.81))
+    >>> round(ms.equilibrium(scene).contact_state(touch).normal_force, 6)
+    0.00981
     """
 
     _replaceable = ("contact_stiffness", "smoothing", "offset", "friction_coefficient", "sticking_speed")
@@ -93,6 +111,7 @@ class Contact(Owner):
         vertices: Numbers | None = None,
         face_samples: int = 0,
         body: Shell | Solid | None = None,
+        shapes: Attached | Sequence[Attached] = (),
     ):
         self.body: Shell | Solid | None = checked_body(body)
         listed = checked_list("obstacles", obstacles, (Obstacle,), "objects of ms.obstacles")
@@ -119,6 +138,23 @@ class Contact(Owner):
         if isinstance(face_samples, bool) or face_samples not in _FACE_POINTS:
             raise ValueError(f"face_samples must be 0, 1 or 3, got {face_samples!r}")
         self.face_samples: int = int(face_samples)
+        self.shapes: tuple[Attached, ...] = checked_shapes(
+            checked_list("shapes", shapes, (Obstacle,), "objects of ms.obstacles")
+        )
+        self._rounds: tuple[RoundPair, ...] = round_pairs(self.shapes, self.obstacles)
+        if self.shapes:
+            self._check_shapes()
+
+    def _check_shapes(self) -> None:
+        """Raise ValueError if a contact of shapes is also about vertices, or about no pair."""
+        about = {"vertices": self.vertices, "body": self.body, "face_samples": self.face_samples or None}
+        for name, given in about.items():
+            if given is not None:
+                raise ValueError(f"a Contact of shapes is not about vertices: give {name} to another Contact")
+        if self.lagged_friction:
+            raise ValueError("lagged_friction is not available with shapes: use lagged_friction=False")
+        if not self._rounds:
+            raise ValueError("shapes and obstacles must hold two that different bodies carry")
 
     def replaced(self, **values: Any) -> Contact:
         """Return the same contact with other parameters of its law."""
@@ -138,6 +174,7 @@ class Contact(Owner):
                 "vertices": self.vertices,
                 "face_samples": self.face_samples,
                 "body": self.body,
+                "shapes": self.shapes,
                 **values,
             },
         )
@@ -151,6 +188,8 @@ class Contact(Owner):
         """Return the contact points on a mesh: their vertices (k, 3), padded with -1, and weights (k, 3); points on
         faces last.
         """
+        if self.shapes:
+            return np.zeros((0, 3), dtype=np.int32), np.zeros((0, 3))
         if self.vertices is not None:
             chosen = indices("Contact vertices", self.vertices, mesh.n_vertices)
         else:
@@ -167,10 +206,14 @@ class Contact(Owner):
         )
 
     def _law(self, *sheets: Shell) -> tuple[float, ...]:
-        """Return the values of `_replaceable` for these bodies: N/m, m, m, 1, m/s."""
-        extent = max(width_of(sheet.mesh) for sheet in sheets)
-        thick = [sheet.thickness for sheet in sheets if isinstance(sheet, Shell)]
-        smoothing = _SMOOTHING * float(np.mean(joined(thick))) if thick else _SMOOTHING_OF_SOLIDS * extent
+        """Return the values of `_replaceable` for these bodies, or for the shapes: N/m, m, m, 1, m/s."""
+        if self.shapes:
+            radii = [each.radius for each in self._rounds]
+            extent, smoothing = 2.0 * max(radii), _SMOOTHING_OF_SHAPES * min(radii)
+        else:
+            extent = max(width_of(sheet.mesh) for sheet in sheets)
+            thick = [sheet.thickness for sheet in sheets if isinstance(sheet, Shell)]
+            smoothing = _SMOOTHING * float(np.mean(joined(thick))) if thick else _SMOOTHING_OF_SOLIDS * extent
         return (
             self.contact_stiffness,
             smoothing if self.smoothing is None else self.smoothing,
@@ -187,7 +230,9 @@ class Contact(Owner):
         """Return the gradient with respect to the thickness of each face of the sheets, on which the default smoothing in
         `_law` depends.
         """
-        by_smoothing = gradient.value(label, "smoothing")[0] if self.smoothing is None else 0.0
+        if self.shapes or self.smoothing is not None:
+            return 0.0
+        by_smoothing = gradient.value(label, "smoothing")[0]
         return (
             _SMOOTHING
             * by_smoothing
@@ -196,6 +241,8 @@ class Contact(Owner):
 
     def _by_width(self, label: str, sheets: Sequence[Shell | Solid], gradient: Gradient) -> float:
         """Return the gradient with respect to the largest width of the bodies, on which the defaults in `_law` depend."""
+        if self.shapes:
+            return 0.0
         of_sheets = any(isinstance(sheet, Shell) for sheet in sheets)
         found = 0.0
         if self.sticking_speed is None:
@@ -207,4 +254,5 @@ class Contact(Owner):
     def __repr__(self) -> str:
         friction = "" if self.friction_coefficient is None else f", friction {self.friction_coefficient:g}"
         with_what = ", ".join(repr(each) for each in self.obstacles)
-        return f"Contact({with_what}; {self.contact_stiffness:g} N/m{friction}{on_body(self.body)})"
+        shapes = f", shapes {', '.join(map(repr, self.shapes))}" if self.shapes else ""
+        return f"Contact({with_what}; {self.contact_stiffness:g} N/m{friction}{on_body(self.body)}{shapes})"

@@ -18,6 +18,7 @@ from ..solids.solid import Solid
 from .attached_obstacles import positioned
 from .body_contact import BodyContact, has_contact_shape, side_of
 from .obstacles.attached import Attached
+from .round_shapes import gap
 
 if TYPE_CHECKING:
     from ..bodies.bodies import Bodies
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
 
 
 def obstacles_of(contacts: Sequence[Contact | BodyContact]) -> tuple[Any, ...]:
-    """Return every obstacle once, in the order in which the contacts name them."""
-    return tuple({id(each): each for contact in contacts for each in contact.obstacles}.values())
+    """Return every obstacle and shape once, in the order in which the contacts name them."""
+    every = [each for contact in contacts for each in (*contact.obstacles, *contact.shapes)]
+    return tuple({id(each): each for each in every}.values())
 
 
 def split_contacts(contacts: Sequence[Contact | BodyContact]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -173,7 +175,7 @@ def check_shapes(
         if part.shape is not None and not len(own.vertices)
     ]
     for contact in contacts:
-        if bare and contact.body is None and contact.vertices is None:
+        if bare and contact.body is None and contact.vertices is None and not contact.shapes:
             raise ValueError(
                 f"{contact!r} would let the shape of rigid part {bare[0]} through, as obstacles keep out vertices of sheets "
                 "and solids only: say which body it is about, Contact(..., body=...), and have a held Shell in the "
@@ -187,7 +189,7 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
     inputs = []
     for contact in contacts:
         vertices, weights = contact_points(bodies, contact)
-        if not len(vertices):
+        if not len(vertices) and not contact.shapes:
             raise ValueError(
                 f"{contact!r} is about nothing: the scene has no vertices that obstacles could keep out"
             )
@@ -199,6 +201,17 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
                 "weights": weights,
                 "rubs": contact.friction_coefficient is not None,
                 "lagged": contact.lagged_friction,
+                "rounds": [
+                    {
+                        "shape": numbers[id(pair.shape)],
+                        "obstacle": numbers[id(pair.obstacle)],
+                        "middle": pair.middle,
+                        "half": pair.half,
+                        "radius": pair.radius,
+                        "crown": pair.crown,
+                    }
+                    for pair in contact._rounds
+                ],
             }
         )
     return inputs
@@ -207,7 +220,7 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
 def _check_attached(contact: Contact, vertices: np.ndarray, bodies: Bodies) -> None:
     """Raise ValueError if an attached obstacle acts on vertices of its own rigid body, or with lagged friction."""
     for obstacle in contact.obstacles:
-        if not isinstance(obstacle, Attached):
+        if not isinstance(obstacle, Attached) or contact.shapes:
             continue
         if contact.lagged_friction:
             raise ValueError(
@@ -230,6 +243,7 @@ def poses(obstacle: Obstacle, times: np.ndarray) -> np.ndarray:
     return np.array([(*obstacle.pose(time), *obstacle.rates(time)) for time in times]).reshape(-1, 4, 3)
 
 
+DEEPEST_START = 0.1  # [-] of the radius of a shape: the depth in an obstacle at which it may start
 # [rad] Largest rotation of the normal of a smooth surface within the smoothing of a contact; a larger one is a kink.
 LARGEST_SMOOTH_TURN = 0.3
 
@@ -276,6 +290,7 @@ def check_outside(scene: Scene, values: Any, points: np.ndarray, time: float) ->
         solid = isinstance(sheet, Solid)
         allowed[span.vertices] = 0.01 * sheet.mesh.size if solid else 0.5 * np.max(sheet.thickness)
     for contact in scene._obstacle_contacts:
+        _check_shapes_outside(scene, values, contact, own, time)
         vertices, weights = contact_points(scene._bodies, contact)
         where = np.einsum("pk,pkc->pc", weights, positions[vertices])
         offset = values.current(contact).offset
@@ -290,6 +305,21 @@ def check_outside(scene: Scene, values: Any, points: np.ndarray, time: float) ->
                     f"{_owner(scene, vertices[worst, 0])} starts inside {obstacle!r}: {_list(touched)}, the deepest "
                     f"{depth[worst]:.3g} m deep at vertex {vertices[worst, 0]}"
                 )
+
+
+def _check_shapes_outside(scene: Scene, values: Any, contact: Contact, own: np.ndarray, time: float) -> None:
+    """Raise ValueError if a shape of a contact starts deeper in an obstacle than a tenth of its radius.
+
+    own: the points of rigid bodies, (n, 3) m, or none if they are at rest.
+    """
+    for pair in contact._rounds:
+        shape, obstacle = (
+            positioned(scene, values.current(each), own if len(own) else None)
+            for each in (pair.shape, pair.obstacle)
+        )
+        depth = values.current(contact).offset - gap(pair, shape, obstacle, time).distance
+        if depth > DEEPEST_START * pair.radius:
+            raise ValueError(f"{pair.shape!r:.80} starts inside {pair.obstacle!r:.80}, {depth:.3g} m deep")
 
 
 def _owner(scene: Scene, vertex: int) -> str:

@@ -38,6 +38,8 @@ def watched_obstacles(
     ids = {id(each) for each in moving}
     watched = []
     for contact in scene._obstacle_contacts if ids else ():
+        if contact.shapes:
+            continue
         faces = _faces_in_contact(scene, contact)
         if not len(faces):
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,6 +15,7 @@ from ..contact.body_contact import BodyContact
 from ..contact.contact import Contact
 from ..contact.contacts_to_core import contact_points
 from ..contact.obstacles import Attached, Obstacle
+from ..contact.round_shapes import gap
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -63,9 +65,11 @@ def pairs_with_obstacles(
 
     all_points, velocities: of the vertices and of the points of rigid bodies, (n, 3). time: s; None in an equilibrium.
     """
+    if contact.shapes:
+        return _pairs_of_shapes(scene, values, contact, all_points, velocities, time)
     vertices, weights = contact_points(scene._bodies, contact)
     numbers = values.current(contact)._law(*values.contact_bodies(contact))
-    stiffness, smoothing, offset, coefficient, sticking_speed = numbers
+    offset = numbers[2]
     corners = np.where(weights != 0.0, vertices, 0)
     points = np.einsum("pk,pkc->pc", weights, all_points[corners])
     point_velocities = np.einsum("pk,pkc->pc", weights, velocities[corners])
@@ -76,28 +80,83 @@ def pairs_with_obstacles(
         active = np.flatnonzero(distances < offset)
         at = points[active]
         normals = body.obstacle.normals(at, body.time)
-        forces = stiffness * _smoothed_depth(offset - distances[active], smoothing)
-        relative = point_velocities[active] - body.velocities(at)
-        sliding = relative - np.sum(relative * normals, axis=1)[:, None] * normals
-        of_vertices = np.pad(weights[active], ((0, 0), (0, 1)))
-        rows = {
-            "pairs": np.pad(
-                np.where(weights[active] != 0.0, vertices[active], -1),
-                ((0, 0), (0, 1)),
-                constant_values=-1,
-            ),
-            "distances": distances[active],
-            "normals": normals,
-            "normal_forces": forces,
-            "friction_forces": -coefficient * forces[:, None] * _per_speed(sliding, sticking_speed) * sliding,
-            "sliding_velocities": sliding,
-            "weights": of_vertices,
-            "forces": of_vertices[:, :, None] * (forces[:, None] * normals)[:, None, :],
-            "swapped": np.zeros(len(active), dtype=bool),
-        }
+        pairs = np.where(weights[active] != 0.0, vertices[active], -1)
+        rows = _with_forces(
+            numbers,
+            np.pad(pairs, ((0, 0), (0, 1)), constant_values=-1),
+            np.pad(weights[active], ((0, 0), (0, 1))),
+            distances[active],
+            normals,
+            point_velocities[active] - body.velocities(at),
+        )
         for name, each in rows.items():
             found.setdefault(name, []).append(each)
     return {name: np.concatenate(each) for name, each in found.items()}
+
+
+def _pairs_of_shapes(
+    scene: Scene,
+    values: Any,
+    contact: Contact,
+    all_points: np.ndarray,
+    velocities: np.ndarray,
+    time: float | None,
+) -> dict[str, np.ndarray]:
+    """Return the pairs of shapes and obstacles that touch, as `pairs_with_obstacles` does."""
+    numbers = values.current(contact)._law()
+    normals, distances, relative, shapes = [], [], [], []
+    for pair in contact._rounds:
+        shape, obstacle = (
+            obstacle_state(scene, values.current(each), time, all_points, velocities)
+            for each in (pair.shape, pair.obstacle)
+        )
+        near = gap(pair, shape.obstacle, obstacle.obstacle, obstacle.time)
+        if near.distance >= numbers[2]:
+            continue
+        normals.append(near.normal)
+        distances.append(near.distance)
+        relative.append(shape.velocities(near.point) - obstacle.velocities(near.point))
+        shapes.append((_index(contact.shapes, pair.shape), _index(contact.obstacles, pair.obstacle)))
+    count = len(distances)
+    found = _with_forces(
+        numbers,
+        np.full((count, 4), -1),
+        np.zeros((count, 4)),
+        np.array(distances),
+        np.reshape(normals, (count, 3)),
+        np.reshape(relative, (count, 3)),
+    )
+    return {**found, "shape_pairs": np.reshape(shapes, (count, 2)).astype(np.int64)}
+
+
+def _index(objects: Sequence[Any], wanted: Any) -> int:
+    return next(k for k, each in enumerate(objects) if each is wanted)
+
+
+def _with_forces(
+    law: tuple[float, ...],
+    pairs: np.ndarray,
+    weights: np.ndarray,
+    distances: np.ndarray,
+    normals: np.ndarray,
+    relative: np.ndarray,
+) -> dict[str, np.ndarray]:
+    """Return the arrays of pairs in contact, with the forces of a contact's law at their relative velocities, (k, 3)
+    m/s."""
+    stiffness, smoothing, offset, coefficient, sticking_speed = law
+    forces = stiffness * _smoothed_depth(offset - distances, smoothing)
+    sliding = relative - np.sum(relative * normals, axis=1)[:, None] * normals
+    return {
+        "pairs": pairs,
+        "distances": distances,
+        "normals": normals,
+        "normal_forces": forces,
+        "friction_forces": -coefficient * forces[:, None] * _per_speed(sliding, sticking_speed) * sliding,
+        "sliding_velocities": sliding,
+        "weights": weights,
+        "forces": weights[:, :, None] * (forces[:, None] * normals)[:, None, :],
+        "swapped": np.zeros(len(distances), dtype=bool),
+    }
 
 
 def _smoothed_depth(depth: np.ndarray, smoothing: float) -> np.ndarray:
@@ -120,7 +179,7 @@ class ContactState:
     pairs: (k, 4), vertices of the scene. A pair of bodies is a vertex and a face, or two edges. Pairs of three or two
         vertices, padded with -1, are a vertex with an edge or with another vertex; they correct for contacts that
         several faces would count more than once. A pair with an obstacle is a point of the body: one vertex, or three
-        of a face.
+        of a face; a pair of a shape has none.
     distances: (k,) m, between the two parts of each pair. normals: (k, 3), from the second part, or the obstacle, to
         the first.
     normal_forces: (k,) N, repulsive; negative for correction pairs.
@@ -132,6 +191,8 @@ class ContactState:
         edges, where the energy of a pair fades out; these have no resultant on an edge. friction: (n_v, 3) N, the
         friction forces.
     normal_force_magnitudes: (n_v,) N, the normal forces that act on each vertex, added without regard to direction.
+    shape_pairs: (k, 2), of a Contact with shapes: the numbers of each pair in `contact.shapes` and `contact.obstacles`;
+        empty for all other contacts.
     """
 
     pairs: np.ndarray
@@ -145,6 +206,7 @@ class ContactState:
     forces: np.ndarray
     friction: np.ndarray
     normal_force_magnitudes: np.ndarray
+    shape_pairs: np.ndarray
     _pushes: np.ndarray  # (n_v, 3) N, the normal forces alone, without the moments on nearly parallel edges
     # (k,), 1 if the first part of the pair is on the first body of the contact, or on the body at an obstacle; else -1
     _direction: np.ndarray
@@ -251,6 +313,7 @@ def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: 
         on_vertices(found["forces"]),
         on_vertices(weights[:, :, None] * found["friction_forces"][:, None, :]),
         on_vertices(np.abs(weights) * found["normal_forces"][:, None]),
+        found.get("shape_pairs", np.zeros((0, 2), dtype=np.int64)),
         on_vertices((weights * found["normal_forces"][:, None])[:, :, None] * found["normals"][:, None, :]),
         np.where(found["swapped"], -1.0, 1.0),
     )

@@ -11,6 +11,7 @@ from ..._input.tensors import detached
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.actuators.tendon import Tendon
 from ...model.contact.obstacles import Capsule, Sphere
+from ...model.contact.round_shapes import shapes_in
 from ...model.rigid.joints import Fixed
 from ...model.rigid.skeleton import Skeleton
 
@@ -75,20 +76,32 @@ def link_surfaces_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndar
 
 
 def shapes_of(result: SolveResult) -> list[list[tuple[np.ndarray, np.ndarray]]]:
-    """Return the surfaces of the free rigid bodies with a shape in every state, as `link_surfaces_of` does for links."""
-    return _moved_surfaces(result, _shapes(result.scene))
+    """Return the surfaces of the free rigid bodies with a shape, and those of the shapes of contacts, in every state, as
+    `link_surfaces_of` does for links."""
+    values = result._values_at(0) if hasattr(result, "_values_at") else None
+    return _moved_surfaces(result, _shapes(result.scene, values))
 
 
 def shapes_at_rest(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the surfaces of a scene's free rigid bodies in the reference configuration."""
+    """Return the surfaces of a scene's free rigid bodies, and of the shapes of its contacts, in the reference
+    configuration."""
     return [(points, faces) for _, points, faces in _shapes(scene)]
 
 
-def _shapes(scene) -> list[Any]:
-    """Return (body, rest vertices (n, 3) m, faces (m, 3)) of the rigid bodies with a shape that are not links."""
+def _shapes(scene, values=None) -> list[Any]:
+    """Return (body, rest vertices (n, 3) m, faces (m, 3)) of the rigid bodies with a shape that are not links, and of the
+    shapes of contacts.
+
+    values: of the solve, if shapes may have other places in it.
+    """
     bodies = scene._bodies
     parts = [part for part in bodies.rigid if part.shape is not None and bodies.skeleton_of(part) is None]
-    return [(part, part.shape.rest_positions, part.shape.faces) for part in parts]
+    smooth = shapes_in(scene.contacts)
+    now = smooth if values is None else tuple(map(values.current, smooth))
+    return [
+        *((part, part.shape.rest_positions, part.shape.faces) for part in parts),
+        *((shape.to, *placed.surface()) for shape, placed in zip(smooth, now, strict=True)),
+    ]
 
 
 def _moved_surfaces(result, surfaces) -> list[list[tuple[np.ndarray, np.ndarray]]]:

@@ -42,7 +42,7 @@ from .link_surfaces import (
 from .magnets import surfaces_of
 from .nodal_forces import nodal_forces
 from .spring_surfaces import creases_of, springs_at_rest, springs_of
-from .surroundings import surroundings_of
+from .surroundings import obstacles_in, surroundings_of
 from .units import clock
 
 if TYPE_CHECKING:
@@ -416,7 +416,7 @@ def _flux_densities(values, count: int) -> list[np.ndarray | None]:
 def _with_own(given: dict[str, Any], scene: Scene, obstacles=None) -> dict[str, Any]:
     """Add the obstacles of a scene, or of a solve, and the magnetization of its bodies, unless others are given."""
     given = _magnetized(given, scene.bodies)
-    own = scene.obstacles if obstacles is None else obstacles
+    own = obstacles_in(scene) if obstacles is None else obstacles
     return {**given, "obstacles": own} if given["obstacles"] is None else given
 
 
