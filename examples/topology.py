@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from _run import run
-from _topology.arm import VOLUME, Arm, density, straight
+from _topology.arm import SHARP, VOLUME, Arm, density, straight
 from _topology.report import draw_design, draw_search, pictures, summary
 from scipy.spatial import cKDTree
 
@@ -80,7 +80,11 @@ def search(arm: Arm, iterations: int, topology=True, magnetization=True, start=N
             return -1e3 * heights.sum(), excess[None] if topology else torch.zeros(0, dtype=torch.float64)
 
         move = 0.08 * (2.0 / sharpness) ** 0.5
-        optimizer = ms.optim.MMA(free, lower=lower, upper=upper, move=move, asymptote_initial=0.2)
+        # Asymptotes beyond the reach of `move` do not shorten steps that alternate: with 0.2 to the end, sharp designs swing
+        # between two forms. Near ones from the start take longer to a first design. J. K. Guest, A. Asadpoure, S.-H. Ha,
+        # Struct. Multidisc. Optim. 44 (2011), ties them to the sharpness in this way.
+        asymptote = 0.2 if sharpness < SHARP else 0.5 / (1.0 + sharpness)
+        optimizer = ms.optim.MMA(free, lower=lower, upper=upper, move=move, asymptote_initial=asymptote)
         ms.minimize(objective, free, optimizer, max_iterations=iterations, feasibility=1e-3, progress=False)
     ended = time.perf_counter() - began
     result = evaluated(arm, variables if topology else None, directions, angle)

@@ -42,6 +42,12 @@ def test_design_is_nearly_black_and_white(result) -> None:
     assert (4.0 * densities * (1.0 - densities)).mean() < 0.12
 
 
+def test_sharp_designs_do_not_swing_between_two_forms(result) -> None:
+    """Check the last six evaluations, which change by 0.13 % in the mean, and by 0.83 % with far asymptotes."""
+    sums = result["designs"]["both"]["history"][-6:, 1:3].sum(axis=1)
+    assert np.abs(np.diff(sums)).mean() < 6e-3 * sums[-1]
+
+
 def test_heights_of_the_last_search_are_those_of_a_solve_from_the_flat_sheet(result) -> None:
     """Check that the design stands where it was found, without the starts of the search."""
     design, arm = result["designs"]["both"], example.Arm((24, 12))
