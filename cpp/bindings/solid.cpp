@@ -113,6 +113,7 @@ std::vector<SpringsInput> springs_of(const py::list& given) {
         springs.rest_length_rows = each["rest_length_rows"].cast<Index>();
         springs.damping_rows = each["damping_rows"].cast<Index>();
         springs.ground_rows = each["ground_rows"].cast<Index>();
+        springs.has_places = each["has_places"].cast<bool>();
         springs.stiffness_unit = each["stiffness_unit"].cast<std::string>();
         springs.damping_unit = each["damping_unit"].cast<std::string>();
         const Rows3 directions = to_rows3(each["directions"].cast<Array>()),

@@ -12,7 +12,6 @@ from both_modes import by_both_modes, direction  # noqa: E402
 from torch.autograd import forward_ad  # noqa: E402
 
 LARGE, FAST = 1e-3, 1e-1  # m and m/s, of meshes of 0.1 m
-DAMPED = "on springs between points in motion"  # which have no tangents by rest positions
 IN_MOTION = [name for name in MAKERS if kind(name).function is ms.simulate]
 PRECISION, ROUNDING = 1e-9, 1e-13  # of the tangent, and of the result itself
 # Tangents contain differences of friction and contact at the beginning of a step. Steps in contact multiply their errors
@@ -73,7 +72,6 @@ def test_tangents_of_motions_agree_with_gradients_in_every_kind(name):
     rng, precision = np.random.default_rng(len(name)), PRECISIONS.get(name, PRECISION)
     alone = [{key: value} for key, value in kind(name).entries.items()]
     for given in (*(alone if name in ALONE else ()), kind(name).together):
-        given = {key: value for key, value in given.items() if name != DAMPED or key[1] != "rest_positions"}
         tensors = {key: torch.tensor(value, requires_grad=True) for key, value in given.items()}
         results = [each for each in results_of(kind(name).found(tensors)) if each.requires_grad]
         inputs = list(tensors.values())

@@ -372,10 +372,11 @@ def test_the_lowest_frequency_of_a_cantilever_falls_with_the_square_of_its_lengt
 
 def test_terms_without_a_derivative_by_rest_positions_are_named_before_the_solve():
     mesh = ms.meshes.rectangle(0.1, 0.06, cells=(2, 1), order=2)
-    grown = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, growth=1.1)
-    scene = ms.Scene(grown, supports=[ms.Clamp(mesh.edges_at(x=0.0))])
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    couple = ms.EdgeCouple(mesh.edges_at(x=0.1), 1e-4)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[couple])
     solved(scene, mesh.rest_positions)
-    with pytest.raises(ms.NoGradient, match="derivative by them of the growth of six-node shells yet"):
+    with pytest.raises(ms.NoGradient, match="no derivative by them of couple yet"):
         solved(scene, torch.tensor(mesh.rest_positions, requires_grad=True))
 
 

@@ -64,6 +64,20 @@ def test_gradient_by_rest_positions_of_a_grown_curved_sheet_agrees_with_differen
     check(scene, [body], np.array(mesh.rest_positions), step=2e-6)
 
 
+@pytest.mark.parametrize("curved", ["growth", "curvature", "both"])
+def test_gradient_by_rest_positions_of_a_grown_curved_six_node_sheet_agrees_with_differences(curved):
+    flat = ms.meshes.rectangle(0.1, 0.04, cells=(3, 2))
+    mesh = ms.QuadraticTriangleMesh.from_triangles(flat)
+    x = mesh.rest_positions + 4e-4 * np.random.default_rng(4).standard_normal(mesh.rest_positions.shape)
+    mesh = ms.QuadraticTriangleMesh(x + 4.0 * x[:, :1] ** 2 * (0, 0, 1), mesh.elements)
+    grown = {} if curved == "curvature" else {"growth": tensors(mesh.n_elements, 1.02, 0.03)}
+    bent = {} if curved == "growth" else {"rest_curvature": tensors(mesh.n_elements, 3.0, 4.0)}
+    body = sheet(mesh, **grown, **bent)
+    clamp = ms.Clamp(mesh.edges_at(x=0.0, tolerance=2e-3))
+    scene = ms.Scene(body, supports=[clamp], gravity=(0.2, 0.1, -9.81))
+    check(scene, [body], np.array(mesh.rest_positions), step=2e-6)
+
+
 def test_gradient_by_rest_positions_of_grown_obtuse_faces_agrees_with_differences():
     """Check faces that the membrane cuts along their other diagonal, whose growth is the mean of two faces."""
     mesh = ms.meshes.rectangle(0.1, 0.012, cells=(3, 2), diagonals="aligned")
@@ -90,6 +104,8 @@ def test_gradient_by_rest_positions_of_grown_obtuse_faces_agrees_with_difference
         "a grown sheet at rest, evenly",
         "a grown sheet in motion, tr_bdf2",
         "a growing sheet in motion, euler",
+        "a grown six-node sheet at rest",
+        "a growing six-node sheet in motion",
         "susceptible shells at rest",
         "susceptible shells in motion",
         "creased at rest",

@@ -28,6 +28,18 @@ TIP = MESH.vertices_at(x=0.1)
         "actuated in motion",
         "on springs between points at rest",
         "on springs between points in motion",
+        "on springs at rest",
+        "on springs in motion, euler",
+        "on damped springs in motion, tr_bdf2",
+        "in motion, with rigid parts, euler",
+        "in motion, with rigid parts, tr_bdf2",
+        "at rest, with a skeleton",
+        "in motion, with a skeleton",
+        "at rest, with screws",
+        "in motion, with screws",
+        "at rest, with a driven skeleton",
+        "in motion, with a driven skeleton",
+        "a driven skeleton on a Plane, contact implicit",
     ],
 )
 def test_kinds_of_scene_with_connections_are_compared_with_differences(name):
@@ -200,38 +212,177 @@ def test_gradient_by_rest_positions_through_default_lengths_of_tendons_and_sprin
     check(scene, [body], X)
 
 
-def test_vertices_of_rigid_bodies_have_no_gradient_in_motions_and_no_tangent():
-    scene, body, _ = carrying()
-    x = torch.tensor(X, requires_grad=True)
-    given = {"values": {body: {"rest_positions": x}}, "applied_flux_density": (0.0, 0.0, 1e-3)}
-    with pytest.raises(ms.NoGradient, match="vertices that belong to a RigidBody"):
-        ms.simulate(scene, steps=1, time_step=1e-3, **given)
-    with torch.autograd.forward_ad.dual_level():
-        given["values"] = {
-            body: {"rest_positions": torch.autograd.forward_ad.make_dual(x.detach(), torch.ones_like(x))}
-        }
-        with pytest.raises(ms.NoGradient, match="vertices belong to a RigidBody"):
-            ms.equilibrium(scene, **given)
+@pytest.mark.parametrize("center", [None, (0.08, 0.03, 0.004)], ids=["mean", "given"])
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=["euler", "tr_bdf2"])
+def test_gradient_by_rest_positions_of_a_moving_sheet_with_a_rigid_body_agrees_with_differences(
+    center, integrator
+):
+    """Check the inertia of the vertices too, by which the body turns in free flight."""
+    scene, body, part = carrying(center=center)
+    turning = np.cross((3.0, -40.0, 5.0), X)
+    given = {"steps": 3, "time_step": 4e-3, "integrator": integrator, "velocities": turning, **EXACT}
+
+    def loss(x):
+        values = {body: {"rest_positions": x}}
+        found = ms.simulate(scene, values=values, applied_flux_density=(1e-3, -2e-3, 3e-3), **given)
+        turned = (weights_of((4, 3, 3)) * tensor(found[part].rotation)).sum()
+        fast = (weights_of(found.velocities.shape) * tensor(found.velocities)).sum()
+        return 1e3 * (weights_of(found.positions.shape) * tensor(found.positions)).sum() + turned + fast
+
+    compare(loss, X, step=2e-6)
 
 
-def test_motions_with_damped_springs_have_no_tangent_by_rest_positions():
+def jointed(**law):
+    """Return a sheet with a root link on its end, which carries a link with a magnet on a hinge."""
+    body = sheet(remanent_magnetization=(0.0, 1e4, 0.0))
+    root = ms.Link(CORNER, mass=1e-3, inertia=1e-7)
+    base = MESH.rest_positions[CORNER].mean(axis=0)
+    arm = ms.Link(
+        center=np.add(base, (0.01, 0, 0.02)), mass=2e-3, inertia=4e-7, magnetic_moment=(1e-3, 2e-3, 5e-3)
+    )
+    hinge = ms.Revolute(arm, root, origin=np.add(base, (0.005, 0, 0.005)), axis=(0.1, 1.0, 0.2), **law)
+    clamp = ms.Clamp(MESH.edges_at(x=0.0))
+    skeleton = ms.Skeleton([root, arm], [hinge])
+    scene = ms.Scene([body, skeleton], supports=[clamp], field=ms.UniformField(), gravity=(0.1, 0.2, -2.0))
+    return scene, body, arm, hinge
+
+
+@pytest.mark.parametrize(
+    "law",
+    [{"spring_stiffness": 2e-3, "torque": 1e-5}, {"motor_angle": 0.2}],
+    ids=["spring", "motor"],
+)
+def test_gradient_by_rest_positions_of_a_sheet_with_a_skeleton_agrees_with_differences(law):
+    scene, body, arm, hinge = jointed(**law)
+    given = {"applied_flux_density": (1e-3, -2e-3, 3e-3), **EXACT}
+    start = ms.equilibrium(scene, values={body: {"rest_positions": X}}, **given)
+
+    def loss(x):
+        found = ms.equilibrium(scene, start=start, values={body: {"rest_positions": x}}, **given)
+        turned = (weights_of((3, 3)) * tensor(found[arm].rotation)).sum()
+        if "motor_angle" in law:
+            turned = turned + 1e4 * tensor(found[hinge].motor_torque)
+        return 1e3 * (weights_of(found.positions.shape) * tensor(found.positions)).sum() + turned
+
+    compare(loss, X)
+
+
+@pytest.mark.parametrize("law", [{"spring_stiffness": 2e-3, "damping": 1e-5}, {"motor_angle": 0.0}])
+def test_gradient_by_rest_positions_of_a_moving_sheet_with_a_skeleton_agrees_with_differences(law):
+    scene, body, arm, _ = jointed(**law)
+    given = {"steps": 3, "time_step": 4e-3, "applied_flux_density": (1e-3, -2e-3, 3e-3), **EXACT}
+
+    def loss(x):
+        found = ms.simulate(scene, values={body: {"rest_positions": x}}, **given)
+        turned = (weights_of((4, 3, 3)) * tensor(found[arm].rotation)).sum()
+        return 1e3 * (weights_of(found.positions.shape) * tensor(found.positions)).sum() + turned
+
+    compare(loss, X, step=2e-6)
+
+
+def test_a_skeleton_at_other_rest_positions_is_where_one_made_so_is():
+    scene, body, arm, hinge = jointed(spring_stiffness=2e-3, torque=1e-5)
+    given = {"applied_flux_density": (1e-3, -2e-3, 3e-3), **EXACT}
+    found = ms.equilibrium(scene, values={body: {"rest_positions": X}}, **given)
+    made = body.replaced(rest_positions=X)
+    same = ms.Scene(
+        [made, scene._bodies.skeletons[0]],
+        supports=scene.supports,
+        field=scene.fields,
+        gravity=scene.gravity,
+    )
+    expected = ms.equilibrium(same, **given)
+    assert np.abs(found.positions - expected.positions).max() < 1e-9
+    assert np.abs(found[arm].rotation - expected[arm].rotation).max() < 1e-7
+    assert float(found[hinge].angle) == pytest.approx(float(expected[hinge].angle), abs=1e-7)
+
+
+BEDS = {
+    "normal": {"direction": "normal"},
+    "along": {"direction": (0.3, -0.2, 1.0)},
+    "all ways": {},
+}
+
+
+@pytest.mark.parametrize("way", BEDS)
+@pytest.mark.parametrize("even", [True, False], ids=["even", "each face"])
+def test_gradient_by_rest_positions_of_a_sheet_on_a_foundation_agrees_with_differences(way, even):
     body = sheet()
-    spring = ms.Spring((body, MESH.rest_positions[TIP[0]]), (0.1, 0.0, 0.02), stiffness=0.2, damping=0.1)
-    scene = ms.Scene(body, supports=[ms.Clamp(MESH.edges_at(x=0.0))], loads=[spring])
-    with torch.autograd.forward_ad.dual_level():
-        x = torch.autograd.forward_ad.make_dual(torch.tensor(X), torch.ones(X.shape, dtype=torch.float64))
-        with pytest.raises(ms.NoGradient, match="damped springs"):
-            ms.simulate(scene, values={body: {"rest_positions": x}}, steps=1, time_step=1e-3)
+    stiffness = 4e3 if even else np.random.default_rng(2).uniform(2e3, 6e3, 9)
+    bed = ms.ElasticFoundation(stiffness, faces=None if even else np.arange(2, 11), **BEDS[way])
+    clamp = ms.Clamp(MESH.edges_at(x=0.0))
+    scene = ms.Scene(body, supports=[clamp], loads=[bed], gravity=(0.2, 0.1, -9.81))
+    check(scene, [body], X, step=3e-6)
+
+
+@pytest.mark.parametrize("kind_of_body", ["solid", "six-node shell"])
+def test_gradient_by_rest_positions_of_other_bodies_on_a_foundation_agrees_with_differences(kind_of_body):
+    if kind_of_body == "solid":
+        box = ms.meshes.box((0.06, 0.02, 0.02), cells=(2, 1, 1))
+        body = ms.Solid(box, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3), mass_density=1e3)
+        hold = ms.Pin(body.mesh.vertices_at(x=0.0))
+    else:
+        flat = ms.meshes.rectangle(0.1, 0.04, cells=(3, 2))
+        body = sheet(ms.QuadraticTriangleMesh.from_triangles(flat))
+        hold = ms.Clamp(body.mesh.edges_at(x=0.0))
+    bed = ms.ElasticFoundation(3e3, direction="normal", faces=np.arange(4, body.mesh.n_faces))
+    scene = ms.Scene(body, supports=[hold], loads=[bed], gravity=(0.2, 0.1, -9.81))
+    some = 4e-4 * np.random.default_rng(3).standard_normal(body.rest_positions.shape)
+    check(scene, [body], np.array(body.rest_positions) + some, step=2e-6)
+
+
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=["euler", "tr_bdf2"])
+def test_gradient_by_rest_positions_of_a_moving_sheet_on_dampers_agrees_with_differences(integrator):
+    body = sheet()
+    middle = MESH.rest_positions.mean(axis=0)
+    loads = [
+        ms.Spring((body, 0.9 * MESH.rest_positions[TIP[0]] + 0.1 * middle), stiffness=0.2, damping=0.02),
+        ms.Spring((body, middle), stiffness=0.3, damping=0.03, direction=(0.3, -0.2, 1.0)),
+        ms.Spring((body, middle), (0.08, 0.0, 0.02), stiffness=0.4, damping=0.02),
+        ms.ElasticFoundation(400.0, direction="normal", damping=9.0),
+    ]
+    clamp = ms.Clamp(MESH.edges_at(x=0.0))
+    scene = ms.Scene(body, supports=[clamp], loads=loads, gravity=(0.2, 0.1, -9.81))
+    velocities = 0.05 * np.random.default_rng(4).standard_normal(X.shape)
+    given = {"steps": 3, "time_step": 4e-3, "integrator": integrator, "velocities": velocities, **EXACT}
+
+    def loss(x):
+        found = ms.simulate(scene, values={body: {"rest_positions": x}}, **given)
+        return 1e3 * (weights_of(found.positions.shape) * tensor(found.positions)).sum()
+
+    compare(loss, X, step=2e-6)
+
+
+@pytest.mark.parametrize("even", [True, False], ids=["even", "each face"])
+@pytest.mark.parametrize("way", BEDS)
+def test_gradient_by_rest_positions_of_the_forces_of_a_foundation_agrees_with_differences(way, even):
+    """Check the ground points, areas and normals that the forces in a result take from the rest shape."""
+    body = sheet()
+    stiffness = 4e3 if even else np.random.default_rng(2).uniform(2e3, 6e3, 9)
+    bed = ms.ElasticFoundation(stiffness, faces=None if even else np.arange(2, 11), **BEDS[way])
+    clamp = ms.Clamp(MESH.edges_at(x=0.0))
+    scene = ms.Scene(body, supports=[clamp], loads=[bed], gravity=(0.2, 0.1, -9.81))
+    start = ms.equilibrium(scene, values={body: {"rest_positions": X}}, **EXACT)
+
+    def loss(x):
+        found = ms.equilibrium(scene, start=start, values={body: {"rest_positions": x}}, **EXACT)
+        forces = tensor(found[bed].forces)
+        return 1e3 * (weights_of(forces.shape) * forces).sum()
+
+    compare(loss, X, step=3e-6)
 
 
 def test_refusals_of_gradients_by_rest_positions_name_the_cause():
-    body = sheet()
-    clamp = ms.Clamp(MESH.edges_at(x=0.0))
-    x = torch.tensor(X, requires_grad=True)
-    damped = ms.Spring((body, MESH.rest_positions[TIP[0]]), stiffness=0.2, damping=0.1)
-    scene = ms.Scene(body, supports=[clamp], loads=[damped])
-    with pytest.raises(ms.NoGradient, match="a Spring with a damper to the ground where it is at rest"):
-        ms.simulate(scene, values={body: {"rest_positions": x}}, steps=1, time_step=1e-3)
-    bed = ms.Scene(body, supports=[clamp], loads=[ms.ElasticFoundation(1e3)])
-    with pytest.raises(ValueError, match="an ElasticFoundation"):
-        ms.equilibrium(bed, values={body: {"rest_positions": X}})
+    scene, body, part = carrying()
+    ball = ms.obstacles.Attached(ms.obstacles.Sphere(1e-3, center=(0.08, 0.02, 0.02)), to=part)
+    with_ball = ms.Scene(
+        [body, part],
+        supports=scene.supports,
+        field=scene.fields,
+        contacts=[ms.Contact(ball, offset=5e-4, vertices=MESH.vertices_at(x=0.0))],
+    )
+    with pytest.raises(ValueError, match="an obstacle Attached to a RigidBody with vertices"):
+        ms.equilibrium(with_ball, values={body: {"rest_positions": X}}, applied_flux_density=(0.0, 0.0, 1e-3))
+    own = ms.Scene(body, supports=scene.supports, own_field=ms.OwnField())
+    with pytest.raises(ValueError, match="an OwnField"):
+        ms.equilibrium(own, values={body: {"rest_positions": X}})

@@ -13,7 +13,6 @@ from both_modes import by_both_modes, direction  # noqa: E402
 from torch.autograd import forward_ad  # noqa: E402
 
 LARGE = 1e-3  # m, of meshes of 0.1 m
-CARRIED = "at rest, with a rigid part"  # whose vertices have no tangents by rest positions
 # Contacts of edges with the same area at rest count the smaller one, which has a kink there: the differences that give
 # tangents converge by the first power of the step.
 BY_REST = {"sheets at rest on each other": 2e-7, "sheets at rest on each other, penalty": 2e-7}
@@ -75,9 +74,6 @@ def test_tangents_agree_with_gradients_in_every_kind(name):
     start = start if isinstance(start, ms.Equilibrium | ms.EquilibriumSet) else None
     alone = [{key: value} for key, value in kind(name).entries.items()]
     for given in (*alone, kind(name).together):
-        given = {key: value for key, value in given.items() if name != CARRIED or key[1] != "rest_positions"}
-        if not given:
-            continue
         tensors = {key: torch.tensor(value, requires_grad=True) for key, value in given.items()}
         results = [each for each in results_of(kind(name).found(tensors, start)) if each.requires_grad]
         inputs = list(tensors.values())

@@ -83,12 +83,9 @@ class Kind:
         """Return whether the solve takes this value, and has a gradient by it."""
         if name != "rest_positions":
             return True
-        turning = self.function is ms.simulate and (
-            any(
-                isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
-                for each in self.scene.supports
-            )
-            or any(part.vertices is not None for part in self.scene.rigid_parts)
+        turning = self.function is ms.simulate and any(
+            isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
+            for each in self.scene.supports
         )
         return not (self.of_linear or turning) and rest_positions_follow(self.scene, owner)
 

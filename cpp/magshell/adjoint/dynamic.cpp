@@ -207,7 +207,8 @@ class Backward {
             g_.velocities += by_v.front();
             by_w_ = std::move(by_w.front());
         }
-        flight.add_by_begin(record.begin.q, record.begin.v, g_.positions, g_.velocities, g_.mass, by_dt);
+        flight.add_by_begin(record.begin.q, record.begin.v, g_.positions, g_.velocities, g_.mass, by_dt,
+                            g_.rest.asked ? &g_.rest.by_nodes : nullptr);
         if (input_.viscosity.any()) {
             model_.parameters().set_time_varying(load_parameters.front());
             model_.evaluate(record.begin.q, model_.parameters().zero_load_parameters());
@@ -230,6 +231,7 @@ class Backward {
             if (!input_.viscosity.any())
                 model_.evaluate(record.begin.q, model_.parameters().zero_load_parameters());
             g_.positions += model_.dampers().forces(viscous.joints.by_d_begin, model_.size());
+            model_.dampers().strains_vjp(viscous.joints.by_d_begin, scene_);
             by_dt += viscous.joints.by_dt;
             if (tableau.begins_explicitly)
                 model_.parameters().damper_rates_vjp(record.begin.q, record.begin.v,

@@ -64,14 +64,15 @@ void FreeFlightAdjoint::add_stage(int stage, const VectorXd& by_x_hat, const Vec
 }
 
 void FreeFlightAdjoint::add_by_begin(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                                     VectorXd& by_masses, double& by_dt) const {
+                                     VectorXd& by_masses, double& by_dt, VectorXd* by_rest) const {
     for (std::size_t k = 0; k < by_.size(); ++k) {
         const FreeFlight::Flight& flight = flight_.flights()[k];
         Of by = by_[k];
         flight.rotation.vjp(by.states, by.rotation);
         by.begin.momentum += by.rotation.momentum;
         flight.body->motion_vjp(flight.begin, q, v, by.begin, by_q, by_v, by_masses);
-        flight.body->inertia_vjp(by.rotation.inverse_inertia, by.arms, by_masses);
+        flight.body->inertia_vjp(by.rotation.inverse_inertia, by.arms.together, by_masses);
+        if (by_rest) flight.body->rest_vjp(by.rotation.inverse_inertia, by.arms, *by_rest);
         by_dt += by.dt + by.rotation.dt;
     }
 }

@@ -19,15 +19,16 @@ class FreeFlightAdjoint {
                         VectorXd& by_q, VectorXd& by_masses);
     /// Adds the gradient with respect to the prediction of a stage.
     void add_stage(int stage, const VectorXd& by_x_hat, const VectorXd& by_v_hat);
-    /// Adds the gradients with respect to the state at the beginning, the masses and the duration of the step.
+    /// Adds the gradients with respect to the state at the beginning, the masses and the duration of the step, and to rest positions unless
+    /// by_rest is nullptr.
     void add_by_begin(const VectorXd& q, const VectorXd& v, VectorXd& by_q, VectorXd& by_v,
-                      VectorXd& by_masses, double& by_dt) const;
+                      VectorXd& by_masses, double& by_dt, VectorXd* by_rest) const;
 
   private:
     struct Of {  // one body
         std::vector<TorqueFreeRotation::StateGradient> states;
         RigidMotion begin;  // gradients with respect to it
-        Vec3 arms = Vec3::Zero();
+        ArmsGradient arms;
         TorqueFreeRotation::Gradients rotation;
         double dt = 0.0;
     };

@@ -72,7 +72,8 @@ Model& MotionDerivatives::set(double t, const LoadParameters& load_parameters) {
     Model& there = reshaped_at(t);
     if (&there != &model_) {
         there.set_angle_branches(model_.angle_branches());
-        there.elastic().set_history(model_.elastic().scale(), shift_);
+        there.elastic().set_history(model_.elastic().scale(), elastic_shift_);
+        there.dampers().set_history(model_.dampers().scale(), dampers_shift_);
     } else if (values_change_) {
         model_.parameters().set_values(values_at(t));
     }
@@ -136,7 +137,7 @@ StrainSet MotionDerivatives::strains(ViscousTerms& terms, const VectorXd& q, con
     const VectorXd by_inputs = strains_.of(
         [&](double t) {
             Model& there = set(t, load_parameters + t * tangent);
-            return numbers_of(&there == &model_ ? terms.strains(q) : there.elastic().strains(q));
+            return numbers_of((&terms == &model_.dampers() ? there.dampers() : there.elastic()).strains(q));
         },
         along_.first_step, 1.0, "a strain");
     set(0.0, load_parameters);
@@ -234,8 +235,8 @@ StrainSet MotionDerivatives::damper_rates(const MotionState& begin, const Vector
     if (!model_.capabilities().has_own_viscosity) return zero;
     const VectorXd found = dampers_.of(
         [&](double t) {
-            set(t, load_parameters + t * tangent);
-            return numbers_of(model_.damper_rates(begin.q + t * q_tangent, begin.v + t * v_tangent));
+            const Model& there = set(t, load_parameters + t * tangent);
+            return numbers_of(there.damper_rates(begin.q + t * q_tangent, begin.v + t * v_tangent));
         },
         step_along({{along_.length, largest(q_tangent)}, {largest(begin.v), largest(v_tangent)}}), 0.0,
         "the rate of a joint");

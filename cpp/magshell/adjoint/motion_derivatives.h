@@ -49,10 +49,15 @@ class MotionDerivatives {
     /// Gives the scene its values, and those that vary in time, at a place along the direction. Returns its model there, which is
     /// another one if the rest shape changes: with the branches of angles, the strain history and the contact factor of this one.
     Model& set(double t, const LoadParameters& load_parameters);
+    /// Returns the model at a place along the direction, without setting its values.
+    Model& reshaped_at(double t);
     /// Sets the model to the conditions of a stage.
     void set_stage(const StageTangent& stage);
-    /// Takes note of the strain history that was set in the elastic terms of the model; nullptr if none was.
-    void set_history(const StrainSet* shift) { shift_ = shift; }
+    /// Takes note of the strain histories that were set in the elastic terms and the dampers of the model; nullptr where none was.
+    void set_history(const StrainSet* elastic, const StrainSet* dampers) {
+        elastic_shift_ = elastic;
+        dampers_shift_ = dampers;
+    }
     /// Returns a step of differences over which the inputs change little, and so do numbers of these sizes at these rates.
     double step_along(std::initializer_list<std::pair<double, double>> sizes_and_rates) const;
 
@@ -71,7 +76,6 @@ class MotionDerivatives {
 
   private:
     VectorXd values_at(double t);
-    Model& reshaped_at(double t);
     void begin_step(Model& model, const StageTangent& stage, double t);
     void find_changing_forces();
     /// Returns the largest force on any dof that cancels in the residual at q; the last result is kept for states that extend no further.
@@ -88,7 +92,7 @@ class MotionDerivatives {
     const TimeVaryingParameters& varying_;
     const MotionInputTangent& along_;
     const bool reshapes_, values_change_;
-    const StrainSet* shift_ = nullptr;
+    const StrainSet *elastic_shift_ = nullptr, *dampers_shift_ = nullptr;
     std::optional<ChangingForces> changing_;   // all may change without it
     double cancelling_ = 0.0, reach_ = 0.0;    // [N], [m] up to which it holds
     std::map<double, Reshaped> reshaped_;      // by their place along the direction

@@ -108,9 +108,9 @@ class ForwardSweep {
             (derivatives_.values_change() || !tangent_.q.isZero(0.0) || !tangent_.v.isZero(0.0))) {
             const Index n = q.size();
             const auto made_consistent = [&](double t) {
-                derivatives_.set(t, load_parameters);
+                const Model& there = derivatives_.set(t, load_parameters);
                 VectorXd moved = q + t * along_.positions, moving = v + t * along_.velocities;
-                dof_map.project_state(moved, &moving);
+                there.dof_map().project_state(moved, &moving);
                 return joined({moved, moving});
             };
             const std::array<Index, 1> ends{n};
@@ -149,8 +149,8 @@ class ForwardSweep {
     }
 
     FreeFlight flight_at(double t, const Tableau& tableau, double dt, double dt_tangent,
-                         const MotionState& begin, std::vector<FreeBody>& bodies) const {
-        bodies = free_bodies(model_.dof_map(), input_.inertia.mass + t * along_.mass);
+                         const MotionState& begin, std::vector<FreeBody>& bodies) {
+        bodies = free_bodies(derivatives_.reshaped_at(t).dof_map(), input_.inertia.mass + t * along_.mass);
         return FreeFlight(bodies, tableau, dt + t * dt_tangent, begin.q + t * tangent_.q,
                           begin.v + t * tangent_.v);
     }
@@ -293,9 +293,9 @@ class ForwardSweep {
         if (!dof_map.has_reduced_coordinates()) return found;
         found += rotation_derivative_.of(
             [&](double t) {
-                derivatives_.set(t, stage.load_parameters + t * stage.tangent);
-                model_.linearize(q + t * q_tangent);
-                return dof_map.acceleration(mass, force);
+                Model& there = derivatives_.set(t, stage.load_parameters + t * stage.tangent);
+                there.linearize(q + t * q_tangent);
+                return there.dof_map().acceleration(mass, force);
             },
             derivatives_.step_along({{along_.length, largest(q_tangent)}}), 0.0,
             "the acceleration by contact");
@@ -316,7 +316,7 @@ class ForwardSweep {
         const ScopedStrainHistory elastic_afterwards(model_);
         const ScopedContactFactor usual_contact_afterwards(model_);
         factorized_here_ = false;
-        derivatives_.set_history(nullptr);
+        derivatives_.set_history(nullptr, nullptr);
         const LoadParameters begin = input_.load_parameters_at(step, part.begin),
                              begin_tangent = load_tangent(step, part.begin);
         derivatives_.set(0.0, begin);
@@ -386,7 +386,7 @@ class ForwardSweep {
             derivatives_.set_stage(stage);
             strains.set_history(i);
             joints.set_history(i);
-            derivatives_.set_history(strains.shift());
+            derivatives_.set_history(strains.shift(), joints.shift());
             const ForceTangent forces = derivatives_.forces(stage, q, tableau.implicit_contact);
             newton_.evaluate(q, stage.load_parameters, proximal);
             const VectorXd residual = forces.gradient + inertia_tangent(stage, v, w) +
@@ -485,9 +485,9 @@ class ForwardSweep {
         VectorXd found = dof_map.motor_forces(residual + product(q_tangent, *proximal.weights));
         found += motor_derivative_.of(
             [&](double t) {
-                derivatives_.set(t, stage.load_parameters + t * stage.tangent);
-                model_.linearize(q + t * q_tangent);
-                return dof_map.motor_forces(gradient);
+                Model& there = derivatives_.set(t, stage.load_parameters + t * stage.tangent);
+                there.linearize(q + t * q_tangent);
+                return there.dof_map().motor_forces(gradient);
             },
             derivatives_.step_along({{along_.length, largest(q_tangent)}}), 0.0, "the force of a motor");
         derivatives_.set(0.0, stage.load_parameters);

@@ -19,14 +19,6 @@ Eigen::Matrix<double, 3, 2> corner_axes(const std::array<Vec3, 6>& x) {
     return plane_axes(edge, edge.cross(x[0] - x[2]).normalized());
 }
 
-/// Returns the barycentric coordinates of Gauss point g of edge i.
-std::array<double, 3> gauss_point(int i, int g) {
-    std::array<double, 3> at{};
-    at[(i + 1) % 3] = 1.0 - six_nodes::gauss[g];
-    at[(i + 2) % 3] = six_nodes::gauss[g];
-    return at;
-}
-
 Vec3 with_zero_z(const Eigen::Vector2d& in_plane) {
     return {in_plane.x(), in_plane.y(), 0.0};
 }
@@ -36,6 +28,19 @@ double test_at(int r, int p) {
 }
 
 }  // namespace
+
+std::array<double, 3> GrownSix::gauss_point(int i, int g) {
+    std::array<double, 3> at{};
+    at[(i + 1) % 3] = 1.0 - six_nodes::gauss[g];
+    at[(i + 2) % 3] = six_nodes::gauss[g];
+    return at;
+}
+
+std::array<double, 3> GrownSix::middle_point(int m) {
+    std::array<double, 3> at = {0.5, 0.5, 0.5};
+    at[m] = 0.0;
+    return at;
+}
 
 TangentPoint::TangentPoint(const std::array<Vec3, 6>& rest, const Vec3& first_axis,
                            const std::array<double, 3>& at) {
@@ -60,11 +65,7 @@ GrownSix::GrownSix(const std::array<Vec3, 6>& rest, const Mat3& growth, const Ma
         interior_points_.emplace_back(rest, axes_.col(0), point.at);
     for (int i = 0; i < 3; ++i)
         for (int g = 0; g < 2; ++g) at_gauss_.emplace_back(rest, axes_.col(0), gauss_point(i, g));
-    for (int m = 0; m < 3; ++m) {
-        std::array<double, 3> at = {0.5, 0.5, 0.5};
-        at[m] = 0.0;
-        at_middle_.emplace_back(rest, axes_.col(0), at);
-    }
+    for (int m = 0; m < 3; ++m) at_middle_.emplace_back(rest, axes_.col(0), middle_point(m));
     const SixNodeFace before(rest);
     for (int r = 0; r < 9; ++r) {
         length_ratio_[r] = 1.0;
@@ -134,30 +135,52 @@ Mat2 GrownSix::membrane_by_growth(const ShellMaterial& m, const Vec9& r, const V
 Mat2 GrownSix::bending_by_growth(const ShellMaterial& m, const Vec9& r, const Vec9& d) const {
     const Mat9 stiffness = face().bending_stiffness(m);
     const Vec9 of_r = stiffness * r, of_d = stiffness * d;
-    const double factor = 12.0 / (m.young_modulus * m.thickness * m.thickness * m.thickness);
     Mat2 sum = Mat2::Zero();
     for (int p = 0; p < 6; ++p) {
-        std::array<Eigen::Vector2d, 3> t;
-        for (int i = 0; i < 3; ++i) t[i] = growth_ * interior_points_[p].along[i];
-        const double jacobian = std::abs(t[0].x() * t[1].y() - t[0].y() * t[1].x());
-        Mat2 moment_r = Mat2::Zero(), moment_d = Mat2::Zero();
-        for (int a = 0; a < 9; ++a) {
-            const Mat2 direction =
-                -symmetric_product(t[(a / 3 + 1) % 3], t[(a / 3 + 2) % 3]) / (jacobian * jacobian);
-            moment_r += scale_[a] * test_at(a, p) * of_r[a] * direction;
-            moment_d += scale_[a] * test_at(a, p) * of_d[a] * direction;
-        }
-        const double weight = factor * 0.5 * six_nodes::inside[p].weight * jacobian;
-        const auto strain = [&](const Mat2& moment) -> Mat2 {
-            return weight *
-                   ((1.0 + m.poisson_ratio) * moment - m.poisson_ratio * moment.trace() * Mat2::Identity());
-        };
-        const Mat2 strain_r = strain(moment_r), strain_d = strain(moment_d);
-        const Mat2 both = inverse_ * (moment_r * strain_d + moment_d * strain_r);
-        sum += both + both.transpose() - 3.0 * moment_r.cwiseProduct(strain_d).sum() * inverse_;
+        const Moments at = moments(m, p, of_r, of_d);
+        const Mat2 both = inverse_ * (at.of_r * at.strain_d + at.of_d * at.strain_r);
+        sum += both + both.transpose() - 3.0 * at.of_r.cwiseProduct(at.strain_d).sum() * inverse_;
     }
     // S d_ equals d.
     return -sum - length_ratio_by_growth(of_r.cwiseProduct(d) + of_d.cwiseProduct(r));
+}
+
+GrownSix::Moments GrownSix::moments(const ShellMaterial& m, int p, const Vec9& of_r, const Vec9& of_d) const {
+    const double factor = 12.0 / (m.young_modulus * m.thickness * m.thickness * m.thickness);
+    std::array<Eigen::Vector2d, 3> t;
+    for (int i = 0; i < 3; ++i) t[i] = growth_ * interior_points_[p].along[i];
+    const double jacobian = std::abs(t[0].x() * t[1].y() - t[0].y() * t[1].x());
+    Moments at{Mat2::Zero(), Mat2::Zero(), Mat2::Zero(), Mat2::Zero()};
+    for (int a = 0; a < 9; ++a) {
+        const Mat2 direction =
+            -symmetric_product(t[(a / 3 + 1) % 3], t[(a / 3 + 2) % 3]) / (jacobian * jacobian);
+        at.of_r += scale_[a] * test_at(a, p) * of_r[a] * direction;
+        at.of_d += scale_[a] * test_at(a, p) * of_d[a] * direction;
+    }
+    const double weight = factor * 0.5 * six_nodes::inside[p].weight * jacobian;
+    const auto strain = [&](const Mat2& moment) -> Mat2 {
+        return weight *
+               ((1.0 + m.poisson_ratio) * moment - m.poisson_ratio * moment.trace() * Mat2::Identity());
+    };
+    at.strain_r = strain(at.of_r);
+    at.strain_d = strain(at.of_d);
+    return at;
+}
+
+Mat2 GrownSix::compliance_by_deformation(const ShellMaterial& m, int p, const Vec9& of_r,
+                                         const Vec9& of_d) const {
+    const Moments at = moments(m, p, of_r, of_d);
+    const Mat2 both = at.of_r * at.strain_d + at.of_d * at.strain_r;
+    return both + both.transpose() - 3.0 * at.of_r.cwiseProduct(at.strain_d).sum() * Mat2::Identity();
+}
+
+double GrownSix::jacobian(int p) const {
+    const std::array<Eigen::Vector2d, 3>& t = interior_points_[p].along;
+    return determinant_ * std::abs(t[0].x() * t[1].y() - t[0].y() * t[1].x());
+}
+
+double GrownSix::curvature_weight(int r, int p) const {
+    return -scale_[r] * 0.5 * six_nodes::inside[p].weight * test_at(r, p) / jacobian(p);
 }
 
 Mat2 GrownSix::length_ratio_by_growth(const Vec9& by_logarithm) const {

@@ -55,7 +55,31 @@ class GrownSix {
 
     Mat3 in_world(const Mat2& tensor) const { return axes_ * tensor * axes_.transpose(); }
 
+    // The parts of the configuration: energy/grown_six_rest.h differentiates them with respect to the reference shape.
+    const std::array<Vec3, 6>& rest() const { return rest_; }
+    const Eigen::Matrix<double, 3, 2>& axes() const { return axes_; }
+    const Mat2& growth() const { return growth_; }
+    const Mat2& curvature() const { return curvature_; }
+    double determinant() const { return determinant_; }
+    const std::vector<TangentPoint>& interior_points() const { return interior_points_; }
+    const std::vector<TangentPoint>& at_gauss() const { return at_gauss_; }
+    const std::vector<TangentPoint>& at_middle() const { return at_middle_; }
+    /// Return the barycentric coordinates of Gauss point g of edge i, and of the middle of edge m.
+    static std::array<double, 3> gauss_point(int i, int g);
+    static std::array<double, 3> middle_point(int m);
+    /// Returns the factor of t'_j . K t'_k at interior point p in curvature_measures()[r].
+    double curvature_weight(int r, int p) const;
+    /// Returns the derivative of r_ . S d_ at an interior point by a homogeneous deformation of the grown tangents there.
+    Mat2 compliance_by_deformation(const ShellMaterial& m, int p, const Vec9& of_r, const Vec9& of_d) const;
+
   private:
+    /// The moments of r_ and d_ at an interior point, and their strains times the area that the point stands for.
+    struct Moments {
+        Mat2 of_r, of_d, strain_r, strain_d;
+    };
+    Moments moments(const ShellMaterial& m, int p, const Vec9& of_r, const Vec9& of_d) const;
+    /// Returns J' at an interior point.
+    double jacobian(int p) const;
     /// Returns the gradient of by_logarithm . log(length_ratio_) with respect to growth.
     Mat2 length_ratio_by_growth(const Vec9& by_logarithm) const;
 

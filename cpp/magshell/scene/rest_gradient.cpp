@@ -1,9 +1,12 @@
 #include "magshell/scene/rest_gradient.h"
 
 #include "magshell/energy/surface_tension.h"
+#include "magshell/terms/actuator/muscle_rate_term.h"
 #include "magshell/terms/contact/body_friction_term.h"
 #include "magshell/terms/contact/contact_term.h"
 #include "magshell/terms/contact/friction_term.h"
+#include "magshell/terms/joint/damper_term.h"
+#include "magshell/terms/joint/joint_term.h"
 #include "magshell/terms/joint/torque_term.h"
 #include "magshell/terms/load/body_force_term.h"
 #include "magshell/terms/load/edge_moment_term.h"
@@ -33,7 +36,7 @@ bool rest_gradient_is_complete(const Term& term) {
     if (const auto* const moments = dynamic_cast<const EdgeMomentTerm*>(&term))
         return !moments->reads_rest_lengths();
     return is_one_of<LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>, GroupEnergyTerm,
-                     SpringTerm, MomentTerm, BodyForceTerm, TorqueTerm>(term);
+                     SpringTerm, MomentTerm, BodyForceTerm, TorqueTerm, JointTerm, DamperTerm>(term);
 }
 
 }  // namespace
@@ -46,7 +49,8 @@ void add_rest_vjp(Model& model, const VectorXd& q, const LoadParameters& load_pa
 }
 
 void add_rest_forces_vjp(const Model& model, const VectorXd& lambda, VectorXd& out) {
-    for (const std::unique_ptr<ForceTerm>& force : model.terms().forces) force->add_rest_vjp(lambda, out);
+    for (const std::unique_ptr<ForceTerm>& force : model.terms().forces)
+        force->add_rest_vjp(model.kinematics(), lambda, out);
 }
 
 void add_rest_strains_vjp(const ViscousTerms& terms, const StrainSet& stresses, VectorXd& out) {
@@ -60,7 +64,9 @@ std::vector<std::string_view> without_rest_gradient(const Model& model) {
     for (const std::unique_ptr<Term>& term : model.terms().energies)
         if (!rest_gradient_is_complete(*term)) names.push_back(term->name());
     for (const std::unique_ptr<ForceTerm>& force : model.terms().forces)
-        if (!is_one_of<BodyFrictionTerm, FrictionTerm, WaterTerm>(*force)) names.push_back(force->name());
+        if (!is_one_of<BodyFrictionTerm, FrictionTerm, WaterTerm, MuscleRateTerm<LinearTetrahedron>,
+                       MuscleRateTerm<QuadraticTetrahedron>>(*force))
+            names.push_back(force->name());
     return names;
 }
 

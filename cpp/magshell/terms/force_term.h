@@ -63,7 +63,8 @@ class ForceTerm {
                      KinematicsGradient& by, Gradient& out) const = 0;
 
     /// Adds - lambda . df/dX at the last evaluated state, three numbers per node, of a force that reads the rest shape of bodies.
-    virtual void add_rest_vjp(const VectorXd& /*lambda*/, VectorXd& /*out*/) const {}
+    virtual void add_rest_vjp(const Kinematics& /*at*/, const VectorXd& /*lambda*/, VectorXd& /*out*/) const {
+    }
 
     /// Freezes the quantities that make the force nonsymmetric (normal forces and normals) at their values of
     /// the last evaluated state, or releases them.

@@ -74,7 +74,7 @@ void FreeBody::motion_vjp(const RigidMotion& motion, const VectorXd& q, const Ve
 }
 
 void FreeBody::inertia_vjp(const Mat3& by_inverse_inertia, const Vec3& by_arms, VectorXd& by_masses) const {
-    const Mat3 by_inertia = -inverse_inertia_ * by_inverse_inertia * inverse_inertia_;
+    const Mat3 by_inertia = this->by_inertia(by_inverse_inertia);
     // A mass also moves the center, and so all arms by -arm / mass_; the inertia does not change by that.
     for (std::size_t k = 0; k < arms_.size(); ++k) {
         const Vec3& arm = arms_[k];
@@ -84,15 +84,31 @@ void FreeBody::inertia_vjp(const Mat3& by_inverse_inertia, const Vec3& by_arms, 
     }
 }
 
-Mat3 FreeBody::add_vjp(const Mat3& matrix, const VectorXd& by_rows, Vec3& by_arms) const {
+// A vertex that moves at rest takes its own arm with it, and moves the center of mass, so that all arms change by - m / mass_ of that. The
+// inertia does not depend on the center.
+void FreeBody::rest_vjp(const Mat3& by_inverse_inertia, const ArmsGradient& by_arms,
+                        VectorXd& by_nodes) const {
+    const Mat3 by_inertia = this->by_inertia(by_inverse_inertia);
+    for (std::size_t k = static_cast<std::size_t>(nodes_->own()); k < arms_.size(); ++k) {
+        const Vec3& arm = arms_[k];
+        const Vec3 through_inertia =
+            2.0 * by_inertia.trace() * arm - (by_inertia + by_inertia.transpose()) * arm;
+        by_nodes.segment<3>(3 * nodes()[k]) +=
+            masses_[k] * (through_inertia - by_arms.together / mass_) + by_arms.each[k];
+    }
+}
+
+Mat3 FreeBody::add_vjp(const Mat3& matrix, const VectorXd& by_rows, ArmsGradient& by_arms) const {
     Mat3 product = Mat3::Zero();
     Vec3 sum = Vec3::Zero();
+    by_arms.each.resize(arms_.size(), Vec3::Zero());
     for (std::size_t k = 0; k < arms_.size(); ++k) {
         const Vec3 by = row(by_rows, nodes()[k]);
         product += by * arms_[k].transpose();
         sum += by;
+        by_arms.each[k] += matrix.transpose() * by;
     }
-    by_arms += matrix.transpose() * sum;
+    by_arms.together += matrix.transpose() * sum;
     return product;
 }
 

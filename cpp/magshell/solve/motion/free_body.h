@@ -24,6 +24,12 @@ struct RigidMotion {
     Vec3 momentum = Vec3::Zero();
 };
 
+/// The gradient with respect to the arms rho of a body: by a displacement of all of them, and by each.
+struct ArmsGradient {
+    Vec3 together = Vec3::Zero();
+    std::vector<Vec3> each;
+};
+
 class FreeBody {
   public:
     /// masses: of all dofs [kg]. The nodes must outlive it.
@@ -48,14 +54,21 @@ class FreeBody {
     /// Adds the gradients with respect to the masses of all dofs, given those with respect to the inverse inertia and to a displacement of
     /// all arms.
     void inertia_vjp(const Mat3& by_inverse_inertia, const Vec3& by_arms, VectorXd& by_masses) const;
+    /// Adds the gradient with respect to the rest positions of the vertices that belong to it, three numbers per node, given those with
+    /// respect to the inverse inertia and to the arms.
+    void rest_vjp(const Mat3& by_inverse_inertia, const ArmsGradient& by_arms, VectorXd& by_nodes) const;
     /// Adds a matrix times rho to the rows of its nodes.
     void add(const Mat3& matrix, VectorXd& rows) const {
         for (std::size_t k = 0; k < arms_.size(); ++k) rows.segment<3>(3 * nodes()[k]) += matrix * arms_[k];
     }
     /// Returns the gradient with respect to that matrix, given the one with respect to the rows. Adds that with respect to the arms.
-    Mat3 add_vjp(const Mat3& matrix, const VectorXd& by_rows, Vec3& by_arms) const;
+    Mat3 add_vjp(const Mat3& matrix, const VectorXd& by_rows, ArmsGradient& by_arms) const;
 
   private:
+    Mat3 by_inertia(const Mat3& by_inverse_inertia) const {
+        return -inverse_inertia_ * by_inverse_inertia * inverse_inertia_;
+    }
+
     const RigidNodes* nodes_;
     std::vector<double> masses_;  // of its nodes [kg]
     std::vector<Vec3> arms_;

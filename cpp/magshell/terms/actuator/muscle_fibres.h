@@ -118,6 +118,25 @@ class MuscleFibres {
         return Element::shape_derivatives(p) * rest.gradients[p];
     }
 
+    /// Adds the gradient with respect to rest positions of a power at a point that is proportional to its volume and a function of F m, and of
+    /// the like of other motions of the nodes. pulled: as Found::pulled, of all of these.
+    void add_rest(Index group, int p, const SimdDouble& power, const SimdDouble pulled[N],
+                  VectorXd& out) const {
+        // A deformation I + H of the rest shape turns F m into F (I - H) m.
+        for (int lane = 0; lane < loop.lanes_in(group); ++lane) {
+            const Index t = loop.element(group, lane);
+            const Eigen::Matrix<double, N, 3> g = gradients(rest_of(t), p);
+            Vec3 direction = Vec3::Zero(), by_direction = direction;
+            for (int k = 0; k < N; ++k) {
+                direction += at(group).m[p].alpha[k][lane] * (fibres.rest(t, k) - fibres.rest(t, 0));
+                by_direction += pulled[k][lane] * g.row(k).transpose();
+            }
+            const Mat3 by = power[lane] * Mat3::Identity() - by_direction * direction.transpose();
+            for (int k = 0; k < N; ++k)
+                out.segment<3>(3 * fibres.nodes_of(t)[k]) += by * g.row(k).transpose();
+        }
+    }
+
     std::size_t bytes() const { return loop.bytes() + bytes_of(pieces_) + bytes_of(segments_); }
 
     /// Gradients of an element with respect to its parameters. `pulled` is the part of each node in the gradient with respect to m, sum_k g_k pulled_k

@@ -113,20 +113,14 @@ class MuscleRateTerm final : public ForceTerm {
             typename Shared::Found found;
             for (int p = 0; p < points; ++p) {
                 const Point point(*this, group, p, x, v);
-                const DeformedFibre& fibre = point.fibre;
-                const SimdVec3 turned = each.m[p].at(adjoint);
-                const SimdDouble along = each.volume[p] * dot(fibre.n, turned);
-                found.strength += along * point.by_strength;
-                found.activation += along * point.by_activation;
-                const SimdVec3 to_rate = (along * point.by_rate) * fibre.n;
-                found.add(p, x,
-                          (along * point.by_length) * fibre.n +
-                              (each.volume[p] * point.tension * fibre.inverse) * fibre.across(turned) +
-                              (along * point.by_rate * fibre.inverse) * fibre.across(point.moves));
-                found.add(p, v, to_rate);
-                found.add(p, adjoint, (each.volume[p] * point.tension) * fibre.n);
-                add_pulls<N>(each.m[p], -to_rate, p == 0, g);
-                const SimdDouble by_rate = along * point.by_rate * point.rate;
+                const Power power(point, each.volume[p], each.m[p].at(adjoint));
+                found.strength += power.along * point.by_strength;
+                found.activation += power.along * point.by_activation;
+                found.add(p, x, power.by_stretched);
+                found.add(p, v, power.by_moves);
+                found.add(p, adjoint, power.by_motion);
+                add_pulls<N>(each.m[p], -power.by_moves, p == 0, g);
+                const SimdDouble by_rate = power.along * point.by_rate * point.rate;
                 for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
                     by_rates[loop_.element(group, lane)] -= by_rate[lane] / largest_rate_;
             }
@@ -136,6 +130,25 @@ class MuscleRateTerm final : public ForceTerm {
         by.velocity += by_velocity.gradient;
         gathered.hand_over(out);
         for (const double each : by_rates) out.values[shortening_rate_.first] += each;
+    }
+
+    void add_rest_vjp(const Kinematics& at, const VectorXd& lambda, VectorXd& out) const override {
+        for (Index group = 0; group < loop_.groups(); ++group) {
+            const Pieces& each = fibres_->at(group);
+            SimdVec3 x[N], v[N], adjoint[N];
+            loop_.gather(group, at.q.data(), x);
+            loop_.gather(group, at.v.data(), v);
+            loop_.gather(group, lambda.data(), adjoint);
+            for (int p = 0; p < points; ++p) {
+                const Point point(*this, group, p, x, v);
+                const Power power(point, each.volume[p], each.m[p].at(adjoint));
+                SimdDouble pulled[N];
+                for (int k = 0; k < N; ++k)
+                    pulled[k] = dot(x[k], power.by_stretched) + dot(v[k], power.by_moves) +
+                                dot(adjoint[k], power.by_motion);
+                fibres_->add_rest(group, p, power.along * point.tension, pulled, out);
+            }
+        }
     }
 
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override {
@@ -188,6 +201,22 @@ class MuscleRateTerm final : public ForceTerm {
             by_rate = pulls * active * steep;
             by_strength = each.activation * active * more;
             by_activation = each.strength * active * more;
+        }
+    };
+
+    /// The power V T n . L m of a point along a motion with the rate L m of its fibre, and its derivatives with respect to F m, F' m and L m.
+    struct Power {
+        SimdDouble along;  // V n . L m
+        SimdVec3 by_stretched, by_moves, by_motion;
+
+        Power(const Point& point, const SimdDouble& volume, const SimdVec3& motion) {
+            const DeformedFibre& fibre = point.fibre;
+            along = volume * dot(fibre.n, motion);
+            by_moves = (along * point.by_rate) * fibre.n;
+            by_motion = (volume * point.tension) * fibre.n;
+            by_stretched = (along * point.by_length) * fibre.n +
+                           (volume * point.tension * fibre.inverse) * fibre.across(motion) +
+                           (along * point.by_rate * fibre.inverse) * fibre.across(point.moves);
         }
     };
 

@@ -133,7 +133,6 @@ class MuscleEnergy final : public MuscleTerm {
         gathered.hand_over(out);
     }
 
-    // A deformation I + H of the rest shape turns F m into F (I - H) m, and the rate of F m likewise.
     void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override {
         for (Index group = 0; group < loop_.groups(); ++group) {
             const Pieces& each = fibres_->at(group);
@@ -145,20 +144,7 @@ class MuscleEnergy final : public MuscleTerm {
                 SimdDouble pulled[N];
                 for (int k = 0; k < N; ++k)
                     pulled[k] = dot(x[k], pull.by_stretched) + dot(adjoint[k], pull.by_rate);
-                for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
-                    const Index t = loop_.element(group, lane);
-                    const Eigen::Matrix<double, N, 3> g = Shared::gradients(fibres_->rest_of(t), p);
-                    Vec3 direction = Vec3::Zero(), by_direction = direction;
-                    for (int k = 0; k < N; ++k) {
-                        direction += each.m[p].alpha[k][lane] *
-                                     (fibres_->fibres.rest(t, k) - fibres_->fibres.rest(t, 0));
-                        by_direction += pulled[k][lane] * g.row(k).transpose();
-                    }
-                    const Mat3 by =
-                        pull.power[lane] * Mat3::Identity() - by_direction * direction.transpose();
-                    for (int k = 0; k < N; ++k)
-                        out.segment<3>(3 * fibres_->fibres.nodes_of(t)[k]) += by * g.row(k).transpose();
-                }
+                fibres_->add_rest(group, p, pull.power, pulled, out);
             }
         }
     }

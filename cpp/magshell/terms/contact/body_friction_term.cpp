@@ -74,7 +74,7 @@ void BodyFrictionTerm::vjp(const Kinematics&, const LoadParameters&, const Vecto
 }
 
 // The force depends on the rest shape through the normal forces alone.
-void BodyFrictionTerm::add_rest_vjp(const VectorXd& lambda, VectorXd& out) const {
+void BodyFrictionTerm::add_rest_vjp(const Kinematics&, const VectorXd& lambda, VectorXd& out) const {
     ContactRest by_rest = contact_.rest_gradient();
     for (const FrictionContact& each : friction_contacts_) {
         const ActiveContact& active = *each.active;

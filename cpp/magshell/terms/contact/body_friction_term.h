@@ -31,7 +31,7 @@ class BodyFrictionTerm final : public ForceTerm {
     void add_stiffness(const Kinematics& at, std::vector<PairStiffness>& out) const override;
     void vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
              KinematicsGradient& by, Gradient& out) const override;
-    void add_rest_vjp(const VectorXd& lambda, VectorXd& out) const override;
+    void add_rest_vjp(const Kinematics& at, const VectorXd& lambda, VectorXd& out) const override;
     void set_frozen(bool frozen) override;
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 

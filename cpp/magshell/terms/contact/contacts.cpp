@@ -37,7 +37,8 @@ void Contacts::vjp(const VectorXd& q, const Kinematics& at, const LoadParameters
 void Contacts::add_rest_vjp(const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& lambda,
                             VectorXd& out) const {
     if (bodies_) bodies_->add_rest_vjp(q.data(), load_parameters, lambda.data(), out);
-    for (const ForceTerm* friction : frictions_) friction->add_rest_vjp(lambda, out);
+    // Friction needs no kinematics here: it reads the normal forces of its last evaluation.
+    for (const ForceTerm* friction : frictions_) friction->add_rest_vjp({}, lambda, out);
 }
 
 double Contacts::energy(const VectorXd& q, const LoadParameters& load_parameters) const {

@@ -23,6 +23,8 @@ struct SpringsInput {
     // Rows of each parameter: one for all springs, or one for each number; 0: not there.
     Index stiffness_rows = 1, rest_length_rows = 0, damping_rows = 0, ground_rows = 0;
     std::string stiffness_unit, damping_unit;
+    // Whether share, direction and ground point of each spring are parameters, as where they follow from rest positions.
+    bool has_places = false;
 };
 
 }  // namespace magshell

@@ -25,6 +25,11 @@ SpringTerm::SpringTerm(const std::vector<SpringsInput>& inputs, const Nodes& nod
                              rest_length = add("rest_length", "m", input.rest_length_rows, 1),
                              damping = add("damping", input.damping_unit, input.damping_rows, 1),
                              ground = add("ground", "m", input.ground_rows, 3);
+        const Index places = input.has_places ? static_cast<Index>(input.springs.size()) : 0;
+        const ParameterSlice share_of_each = add("shares", "m2", places, 1),
+                             direction_of_each = add("directions", "1", places, 3),
+                             ground_of_each = add("grounds", "m", places, 3);
+        Index place_of = 0;
         for (const SpringsInput::Spring& given : input.springs) {
             const auto row = [&](const ParameterSlice& slice) {
                 return Parameter{slice, slice.rows > 1 ? given.number : slice.rows - 1};
@@ -50,6 +55,11 @@ SpringTerm::SpringTerm(const std::vector<SpringsInput>& inputs, const Nodes& nod
             spring.rest_length_of = row(rest_length);
             spring.damping_of = row(damping);
             spring.ground_of = row(ground);
+            if (input.has_places) {
+                spring.share_of = {share_of_each, place_of};
+                spring.direction_of = {direction_of_each, place_of};
+                spring.ground_of = {ground_of_each, place_of++};
+            }
             Vec3 at_rest = -given.ground;
             spring.reach = given.ground.lpNorm<Eigen::Infinity>();
             for (std::size_t j = 0; j < spring.nodes.size(); ++j) {
@@ -73,6 +83,11 @@ bool SpringTerm::set_values(const Values& values) {
             changed |= values.changed(of.slice);
             return values.number(of.slice, of.row);
         };
+        if (spring.share_of.exists()) {
+            spring.share = number(spring.share_of);
+            changed |= values.changed(spring.direction_of.slice);
+            spring.direction = values.vector(spring.direction_of.slice, spring.direction_of.row);
+        }
         spring.stiffness = spring.share * number(spring.stiffness_of);
         spring.damping = spring.share * number(spring.damping_of);
         spring.rest_length = number(spring.rest_length_of);
@@ -91,10 +106,10 @@ Vec3 SpringTerm::Spring::weighted(const double* rows) const {
 }
 
 SpringTerm::Local SpringTerm::local(const Spring& spring, const Vec3& along) {
-    if (spring.has_direction) return {spring.direction.dot(along), spring.direction, Mat3::Zero()};
+    if (spring.has_direction) return {along, spring.direction.dot(along), spring.direction, Mat3::Zero()};
     const double length = std::sqrt(along.squaredNorm() + spring.softening * spring.softening);
     const Vec3 slope = along / length;
-    return {length, slope, (Mat3::Identity() - slope * slope.transpose()) / length};
+    return {along, length, slope, (Mat3::Identity() - slope * slope.transpose()) / length};
 }
 
 double SpringTerm::force(std::size_t k) const {
@@ -190,6 +205,21 @@ void SpringTerm::vjp(const double*, const LoadParameters&, const double* lambda,
             out.values[spring.damping_of.at()] += spring.share * viscous_strain(k) * rate;
         if (spring.ground_of.exists())
             out.values.segment<3>(spring.ground_of.at()) -= hessian(k, false) * moved;
+        if (!spring.share_of.exists()) continue;
+        out.values[spring.share_of.at()] += force(k) * rate / spring.share;
+        out.values.segment<3>(spring.direction_of.at()) +=
+            stiffness(k) * rate * now_[k].along + force(k) * moved;
+    }
+}
+
+// A rest length that changes is not part of s.
+void SpringTerm::strains_vjp(const Strains& stresses, Gradient& out) const {
+    for (Index k = 0; k < elements(); ++k) {
+        const Spring& spring = springs_[k];
+        const double stress = stresses.number(k, 0);
+        if (spring.ground_of.exists()) out.values.segment<3>(spring.ground_of.at()) -= stress * now_[k].slope;
+        if (spring.direction_of.exists())
+            out.values.segment<3>(spring.direction_of.at()) += stress * now_[k].along;
     }
 }
 
@@ -225,13 +255,15 @@ Strains SpringTerm::rates(const double* q, const double* v) const {
 }
 
 void SpringTerm::rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q,
-                           VectorXd& by_v, Gradient&) const {
+                           VectorXd& by_v, Gradient& out) const {
     for (Index k = 0; k < elements(); ++k) {
         const Spring& spring = springs_[k];
         const Local at = local(spring, spring.along(q));
         const double by = by_rates.number(k, 0);
         add_to(spring, by * at.slope, by_v);
         add_to(spring, by * at.curvature * spring.weighted(v), by_q);
+        if (spring.direction_of.exists())
+            out.values.segment<3>(spring.direction_of.at()) += by * spring.weighted(v);
     }
 }
 

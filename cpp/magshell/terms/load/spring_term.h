@@ -45,6 +45,7 @@ class SpringTerm final : public DampedTerm {
     Strains strain_rates(const double* p) override;
     Strains stresses(const Strains& strains) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
+    void strains_vjp(const Strains& stresses, Gradient& out) const override;
 
     Strains rates(const double* q, const double* v) const override;
     void rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q, VectorXd& by_v,
@@ -65,7 +66,7 @@ class SpringTerm final : public DampedTerm {
         Vec3 direction;
         bool has_direction;
         double share, softening, reach;  // [1 or m2], [m], [m] largest coordinate at rest
-        Parameter stiffness_of, rest_length_of, damping_of, ground_of;
+        Parameter stiffness_of, rest_length_of, damping_of, ground_of, share_of, direction_of;
         double stiffness = 0.0, rest_length = 0.0, damping = 0.0;  // stiffness and damping include the share
         Vec3 ground;
 
@@ -74,8 +75,9 @@ class SpringTerm final : public DampedTerm {
         /// Returns the vector t along the spring.
         Vec3 along(const double* q) const { return weighted(q) - ground; }
     };
-    /// The elongation of a spring with its first and second derivatives with respect to t.
+    /// The vector t along a spring, and the elongation with its first and second derivatives with respect to t.
     struct Local {
+        Vec3 along = Vec3::Zero();
         double value = 0.0;
         Vec3 slope = Vec3::Zero();
         Mat3 curvature = Mat3::Zero();

@@ -6,11 +6,32 @@
 //   r . dC d = - (C r) . dS (C d)
 #include "magshell/energy/rest_point_six.h"
 #include "magshell/terms/shell6/bending_six_term.h"
+#include "magshell/terms/shell6/grown_rest_nodes.h"
 
 namespace magshell {
+namespace {
+
+// Computes the measures inside the faces of a SIMD vector at one point after another, by a function of the point and the measures there with
+// 1/J = 1.
+template <class OfPoint>
+void each_point(const BendingSix& shape, const BendingSix::Element& element, const OfPoint& of_point) {
+    BendingSix::Element unit = element;
+    for (SimdDouble& each : unit.inverse_jacobian) each = SimdDouble(0.0);
+    for (int point = 0; point < BendingSix::points; ++point) {
+        unit.inverse_jacobian[point] = SimdDouble(1.0);
+        of_point(point, unit);
+        unit.inverse_jacobian[point] = SimdDouble(0.0);
+    }
+}
+
+}  // namespace
 
 void BendingSixTerm::add_rest_vjp(const double* q, const LoadParameters&, const double* lambda,
                                   VectorXd& out) {
+    if (growth_.any()) {
+        add_grown_rest_vjp(q, lambda, out);
+        return;
+    }
     Strains by_strains(shell_.n_faces(), 9);
     std::vector<ByRestFace> by_faces(shell_.n_faces());
     std::vector<Vec9> of_rates(shell_.n_faces()), of_strains(shell_.n_faces());
@@ -64,21 +85,144 @@ void BendingSixTerm::add_rest_vjp(const double* q, const LoadParameters&, const 
                                                       of_strains[f]);
             rest.add_by_deformation(face.in_world(-by), shell_.own_nodes[f], out);
         }
-        add_rest_face(f, by_faces[f], out);
+        add_rest_face(f, rest_[f], by_faces[f], out);
     }
     add_rest_angles(by_strains, out);
 }
 
+// The derivatives of d are those of f' at the present shape, by the grown 1/J' and s', minus those of the natural measures.
+void BendingSixTerm::add_grown_strains_by_rest(Index group, const BendingSix& now,
+                                               const Vec9 by[SimdDouble::width],
+                                               GrownSixRest* const of_faces[SimdDouble::width],
+                                               VectorXd& out) const {
+    const BendingSix::Element& element = elements_[group];
+    each_point(now, element, [&](int point, const BendingSix::Element& unit) {
+        SimdDouble here[9];
+        now.measures(unit, here);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Vec9 power = by[lane].cwiseProduct(lane_of<9>(here, lane));
+            of_faces[lane]->add_inverse_jacobian(point, power.sum());
+            of_faces[lane]->add_scale(element.inverse_jacobian[point][lane] * power);
+        }
+    });
+    SimdVec3 x[6], by_node[6];
+    for (int lane = 0; lane < SimdDouble::width; ++lane)
+        for (int k = 0; k < 6; ++k) set_lane(x[k], lane, shell_.rest[loop_.element(group, lane)][k]);
+    const BendingSix at_rest(x);
+    BendingSix::Element reference;
+    SimdDouble by_reference[9];
+    std::vector<SixNodeFace> faces;
+    for (int lane = 0; lane < SimdDouble::width; ++lane) {
+        const Index f = loop_.element(group, lane);
+        const SixNodeFace& face = faces.emplace_back(shell_.rest[f]);
+        for (int p = 0; p < BendingSix::points; ++p)
+            reference.inverse_jacobian[p].set(lane, face.inverse_jacobian[p]);
+        const bool counts = lane < loop_.lanes_in(group);
+        const Vec9 factors = counts ? grown(f).reference_factors() : Vec9::Zero().eval();
+        for (int r = 0; r < 9; ++r) {
+            reference.scale[r].set(lane, face.scale[r]);
+            by_reference[r].set(lane, counts ? -by[lane][r] * factors[r] : 0.0);
+        }
+        if (counts) of_faces[lane]->add_natural(-by[lane], reference_interior_[f] + rest_angles(f));
+    }
+    SixNodeRows rows;
+    at_rest.rows(reference, rows);
+    rows.forces(by_reference, by_node);
+    ByRestFace found[SimdDouble::width];
+    each_point(at_rest, reference, [&](int point, const BendingSix::Element& unit) {
+        SimdDouble there[9];
+        at_rest.measures(unit, there);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Vec9 power = lane_of<9>(by_reference, lane).cwiseProduct(lane_of<9>(there, lane));
+            found[lane].inverse_jacobian[point] += power.sum();
+            for (int r = 0; r < 9; ++r)
+                found[lane].scale[r] +=
+                    reference.inverse_jacobian[point][lane] * power[r] / reference.scale[r][lane];
+        }
+    });
+    for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+        const Index f = loop_.element(group, lane);
+        for (int k = 0; k < 6; ++k) found[lane].nodes[k] = lane_of(by_node[k], lane);
+        found[lane].scale += add_rest_nodes(*of_faces[lane], growth_, f, shell_.own_nodes[f], out);
+        add_rest_face(f, faces[lane], found[lane], out);
+    }
+}
+
+void BendingSixTerm::add_grown_rest_vjp(const double* q, const double* lambda, VectorXd& out) {
+    store_rates(lambda);
+    Strains by_angles(shell_.n_faces(), 9);
+    for (Index group = 0; group < loop_.groups(); ++group) {
+        SimdVec3 x[6], p[6];
+        SimdDouble d[9], along[9], stresses[9], inside[9];
+        SixNodeRows rows;
+        loop_.gather(group, q, x);
+        loop_.gather(group, lambda, p);
+        strain(group, q, d);
+        history_.apply<9>(group, d);
+        rate(group, lambda, along);
+        stiffness_[group].times(along, stresses);
+        const BendingSix now(x);
+        std::vector<GrownSix> faces;
+        std::vector<GrownSixRest> by_faces;
+        Vec9 by_strains[SimdDouble::width];
+        GrownSixRest* of_faces[SimdDouble::width] = {};
+        faces.reserve(SimdDouble::width);
+        by_faces.reserve(SimdDouble::width);
+        for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+            const Index f = loop_.element(group, lane);
+            const GrownSix& face = faces.emplace_back(grown(f));
+            of_faces[lane] = &by_faces.emplace_back(face);
+            const Vec9 of_r = lane_of<9>(stresses, lane), of_d = lane_of<9>(stress_.at(group), lane);
+            by_strains[lane] = history_.factor() * of_r;
+            of_faces[lane]->add_compliance(materials_[f], of_r, of_d);
+            of_faces[lane]->add_scale(
+                -(of_r.cwiseProduct(lane_of<9>(d, lane)) + of_d.cwiseProduct(lane_of<9>(along, lane))));
+            const Vec9 by_angle = by_strains[lane].cwiseProduct(face.reference_factors());
+            for (int r = 0; r < 9; ++r) by_angles.set(f, r, by_angle[r]);
+        }
+        // The rates inside the face depend on 1/J' and s' as the strains do.
+        each_point(now, elements_[group], [&](int point, const BendingSix::Element& unit) {
+            now.rows(unit, rows);
+            rows.along(p, inside);
+            for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                const Vec9 power = lane_of<9>(stress_.at(group), lane).cwiseProduct(lane_of<9>(inside, lane));
+                of_faces[lane]->add_inverse_jacobian(point, power.sum());
+                of_faces[lane]->add_scale(elements_[group].inverse_jacobian[point][lane] * power);
+            }
+        });
+        add_grown_strains_by_rest(group, now, by_strains, of_faces, out);
+    }
+    add_rest_angles(by_angles, out);
+}
+
 void BendingSixTerm::add_rest_strains_vjp(const Strains& by_strains, VectorXd& out) const {
+    Strains by_angles = by_strains;
     for (Index group = 0; group < loop_.groups(); ++group) {
         SimdVec3 x[6];
         loop_.gather(group, state_.data(), x);
+        if (growth_.any()) {
+            std::vector<GrownSix> faces;
+            std::vector<GrownSixRest> by_faces;
+            Vec9 by[SimdDouble::width];
+            GrownSixRest* of_faces[SimdDouble::width] = {};
+            faces.reserve(SimdDouble::width);
+            by_faces.reserve(SimdDouble::width);
+            for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
+                const Index f = loop_.element(group, lane);
+                of_faces[lane] = &by_faces.emplace_back(faces.emplace_back(grown(f)));
+                by[lane] = lane_of<9>(by_strains.at(group), lane);
+                const Vec9 by_angle = by[lane].cwiseProduct(faces.back().reference_factors());
+                for (int r = 0; r < 9; ++r) by_angles.set(f, r, by_angle[r]);
+            }
+            add_grown_strains_by_rest(group, BendingSix(x), by, of_faces, out);
+            continue;
+        }
         ByRestFace found[SimdDouble::width];
         strains_by_rest(group, BendingSix(x), by_strains.at(group), found);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
-            add_rest_face(loop_.element(group, lane), found[lane], out);
+            add_rest_face(loop_.element(group, lane), rest_[loop_.element(group, lane)], found[lane], out);
     }
-    add_rest_angles(by_strains, out);
+    add_rest_angles(by_angles, out);
 }
 
 void BendingSixTerm::strains_by_rest(Index group, const BendingSix& now, const SimdDouble by[9],
@@ -113,14 +257,15 @@ void BendingSixTerm::strains_by_rest(Index group, const BendingSix& now, const S
 }
 
 // A deformation I + H at a point changes 1/J~ by - tr H / J~. s is twice the length of an edge at its Gauss points, or of its chord.
-void BendingSixTerm::add_rest_face(Index f, const ByRestFace& by, VectorXd& out) const {
+void BendingSixTerm::add_rest_face(Index f, const SixNodeFace& at_rest, const ByRestFace& by,
+                                   VectorXd& out) const {
     const std::array<Vec3, 6>& rest = shell_.rest[f];
     const std::array<Index, 6>& nodes = shell_.own_nodes[f];
     for (int k = 0; k < 6; ++k) out.segment<3>(3 * nodes[k]) += by.nodes[k];
     for (int p = 0; p < BendingSix::points; ++p) {
         const RestPointSix point(rest, six_nodes::inside[p].at);
         const RestShape shape(point.corners());
-        const double less = -by.inverse_jacobian[p] * rest_[f].inverse_jacobian[p];
+        const double less = -by.inverse_jacobian[p] * at_rest.inverse_jacobian[p];
         point.add_by_edges({less * shape.gradients[1], less * shape.gradients[2]}, nodes, out);
     }
     const auto add_length = [&](const std::array<int, 3>& of, const std::array<double, 3>& factors,

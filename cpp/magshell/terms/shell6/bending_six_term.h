@@ -20,6 +20,8 @@
 
 namespace magshell {
 
+class GrownSixRest;
+
 class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public RestShapeTerm {
   public:
     BendingSixTerm(const SixNodeShell& shell, Index body, const ColoredLoop& element_blocks,
@@ -30,7 +32,6 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     bool varies() const override { return growth_.any(); }
-    bool has_rest_gradient() const override { return !growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const LoadParameters&) const override;
     void evaluate(const double* q, const LoadParameters&, Residual& out) override;
@@ -109,7 +110,12 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
     // Computes the gradient of by . d, with d the measures inside the faces of a SIMD vector. now: the shape of these faces at q.
     void strains_by_rest(Index group, const BendingSix& now, const SimdDouble by[9],
                          ByRestFace out[SimdDouble::width]) const;
-    void add_rest_face(Index face, const ByRestFace& by, VectorXd& out) const;
+    // rest: the face at rest, without growth.
+    void add_rest_face(Index face, const SixNodeFace& rest, const ByRestFace& by, VectorXd& out) const;
+    // The same for shells that grow: of lambda . g, and of by . d at the shapes `now` of a SIMD vector of faces at q.
+    void add_grown_rest_vjp(const double* q, const double* lambda, VectorXd& out);
+    void add_grown_strains_by_rest(Index group, const BendingSix& now, const Vec9 by[SimdDouble::width],
+                                   GrownSixRest* const of_faces[SimdDouble::width], VectorXd& out) const;
     void add_rest_angles(const Strains& by_strains, VectorXd& out) const;
     Mat2 compliance_by_deformation(Index face, const GrownTriangle& triangle, const std::array<double, 3>& at,
                                    double weight, const Vec9& of_r, const Vec9& of_d) const;

@@ -1,5 +1,6 @@
 // The gradient of the membrane energy of quadratic triangles by rest positions.
 #include "magshell/energy/rest_point_six.h"
+#include "magshell/terms/shell6/grown_rest_nodes.h"
 #include "magshell/terms/shell6/membrane_six_term.h"
 
 namespace magshell {
@@ -20,7 +21,13 @@ void MembraneSixTerm::add_rest_vjp(const double* q, const LoadParameters&, const
             rates[loop_.element(group, lane)] = lane_of<9>(along, lane);
         }
     });
-    for (Index f = 0; f < shell_.n_faces(); ++f)
+    for (Index f = 0; growth_.any() && f < shell_.n_faces(); ++f) {
+        const GrownSix face = grown(f);
+        GrownSixRest by(face);
+        by.add_membrane(materials_[f], rates[f], strains[f]);
+        add_rest_nodes(by, growth_, f, shell_.own_nodes[f], out);
+    }
+    for (Index f = 0; !growth_.any() && f < shell_.n_faces(); ++f)
         for (const six_nodes::Point& point : six_nodes::inside) {
             const RestPointSix rest(shell_.rest[f], point.at);
             const GrownFace face(rest.corners(), Mat3::Identity(), Mat3::Zero());
@@ -39,6 +46,17 @@ void MembraneSixTerm::add_rest_strains_vjp(const Strains& stresses, VectorXd& ou
 }
 
 void MembraneSixTerm::add_rest_measures_vjp(const Strains& by_measures, VectorXd& out) const {
+    if (growth_.any()) {
+        for (Index f = 0; f < shell_.n_faces(); ++f) {
+            const GrownSix face = grown(f);
+            GrownSixRest by(face);
+            Vec9 of_face;
+            for (int r = 0; r < 9; ++r) of_face[r] = by_measures.number(f, r);
+            by.add_lengths(of_face);
+            add_rest_nodes(by, growth_, f, shell_.own_nodes[f], out);
+        }
+        return;
+    }
     for (Index group = 0; group < loop_.groups(); ++group) {
         SimdVec3 x[6], by_node[6];
         SixNodeRows rows;

@@ -23,7 +23,6 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9>, public 
     Index body() const override { return body_; }
     bool set_values(const Values& values) override;
     bool varies() const override { return growth_.any(); }
-    bool has_rest_gradient() const override { return !growth_.any(); }
     double length_scale() const override { return materials_.thinnest(); }
     double energy(const double* q, const LoadParameters&) const override;
     void evaluate(const double* q, const LoadParameters&, Residual& out) override;
@@ -50,7 +49,7 @@ class MembraneSixTerm final : public StrainScaffold<MembraneSixTerm, 9>, public 
     }
     GrownSix grown(Index face) const;
     void grow();
-    // Adds the gradient with respect to rest positions from that with respect to the measures at rest.
+    // Adds the gradient with respect to rest positions from that with respect to the natural measures.
     void add_rest_measures_vjp(const Strains& by_measures, VectorXd& out) const;
     void begin_strains(const double*) {}
     void begin_rates(const double*) {}

@@ -63,7 +63,12 @@ def embedded_in(body: Any, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def moved_with(body: Any, now: Any, point: np.ndarray) -> np.ndarray:
-    """Return where a point (3,) m of a body lies in the same body with other rest positions, `now`."""
+    """Return where a point (3,) m of a body lies in the same body with other rest positions, `now`.
+
+    Points of rigid bodies stay, as do the points that stand for their inertia.
+    """
+    if isinstance(body, RigidBody):
+        return point
     vertices, weights = embedded_in(body, point)
     return point + weights @ (now.mesh.rest_positions[vertices] - body.mesh.rest_positions[vertices])
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.given_values import rest_tensor_of
 from ..._input.selections import indices, selection
 from ..._input.tensors import as_operand
 from ..bodies.bodies import Bodies, checked_body, on_body
@@ -15,6 +16,7 @@ from .springs import Springs, SpringsResult, axes, numbers_of_springs, scene_ver
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed, Numbers, SolveResult
+    from ..scene.values import Gradient, Values
 
 
 class ElasticFoundation(Springs):
@@ -92,14 +94,12 @@ class ElasticFoundation(Springs):
                     f"{name} [{self._unit(name)}] must be a number or have shape ({len(chosen)},), got {value.shape}"
                 )
         faces = mesh.faces[chosen]
-        a, b, c = np.moveaxis(mesh.rest_positions[faces], 1, 0)
-        third = np.repeat(np.cross(b - a, c - a) / 6.0, 3, axis=0)  # of the area, times the normal
+        third = _thirds(mesh, faces)
         vertices, numbers = faces.ravel(), np.repeat(np.arange(len(chosen)), 3)
         areas = np.linalg.norm(third, axis=1)
-        if self.stiffness.ndim == 0 and (self.damping is None or self.damping.ndim == 0):
+        if self._is_even:
             vertices, row_of = np.unique(vertices, return_inverse=True)
-            areas = np.bincount(row_of, areas)
-            third = np.stack([np.bincount(row_of, third[:, axis]) for axis in range(3)], axis=1)
+            areas, third = np.bincount(row_of, areas), _summed(third, row_of)
             numbers = np.zeros(len(vertices), dtype=np.int64)
         lengths = np.linalg.norm(third, axis=1)
         if isinstance(self.direction, str) and not lengths.min() > 1e-6 * areas.max():
@@ -109,24 +109,91 @@ class ElasticFoundation(Springs):
             )
         return vertices, areas, numbers, third / np.maximum(lengths, np.finfo(float).tiny)[:, None]
 
-    def _core_input(self, label: str, bodies: Bodies) -> dict[str, Any]:
-        span = bodies.of(self)
-        vertices, areas, numbers, normals = self._lumped(span.mesh)
+    def _lumped_at(self, rest: Any, mesh: Any) -> tuple[Any, Any]:
+        """Return the areas (m,) and normals (m, 3) of the springs at rest positions that are a tensor, (n_v, 3) m."""
+        chosen = (
+            slice(None)
+            if self.faces is None
+            else indices("ElasticFoundation faces", self.faces, mesh.n_faces)
+        )
+        faces = mesh.faces[chosen]
+        a, b, c = (rest[faces[:, k]] for k in range(3))
+        third = ((b - a).cross(c - a, dim=-1) / 6.0).repeat_interleave(3, 0)
+        areas = ((third**2).sum(-1) ** 0.5)[:, None].expand(-1, 3)
+        if self._is_even:
+            row_of = np.unique(faces, return_inverse=True)[1].ravel()
+            areas, third = _summed(areas, row_of), _summed(third, row_of)
+        lengths = (third**2).sum(-1, keepdim=True) ** 0.5
+        return areas[:, 0], third / lengths.clamp(min=np.finfo(float).tiny)
+
+    @property
+    def _is_even(self) -> bool:
+        """Return whether its numbers are the same for all faces, so that each vertex has one spring."""
+        return self.stiffness.ndim == 0 and (self.damping is None or self.damping.ndim == 0)
+
+    @property
+    def _along(self) -> int:
+        """The number of springs of each vertex or corner, one for each direction."""
+        return 1 if isinstance(self.direction, str) else len(axes(self.direction))
+
+    def _each_spring(self, mesh: Any) -> dict[str, np.ndarray]:
+        """Return the directions (n, 3), ground points (n, 3) m and areas (n,) m2 of the n springs of the core."""
+        vertices, areas, _, normals = self._lumped(mesh)
+        own = None if isinstance(self.direction, str) else axes(self.direction)
+        return {
+            "directions": normals if own is None else np.tile(own, (len(vertices), 1)),
+            "grounds": np.repeat(mesh.rest_positions[vertices], self._along, axis=0),
+            "shares": np.repeat(areas, self._along),
+        }
+
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+        super()._add_numbers(label, values, numbers)
+        if (label, "shares") in values.scene._value_layout:
+            places = self._each_spring(values.scene._bodies.of(self).mesh)
+            numbers |= {(label, name): rows for name, rows in places.items()}
+
+    def _by_rest_positions(self, mesh: Any, label: str, gradient: Gradient) -> np.ndarray:
+        """Return the gradient by the rest positions of its body, (n_v, 3), through ground points, areas and normals."""
+        vertices, _, _, normals = self._lumped(mesh)
+        found = np.zeros((mesh.n_vertices, 3))
+        by = {name: gradient.value(label, name) for name in ("shares", "grounds", "directions")}
+        np.add.at(found, vertices, by["grounds"].reshape(-1, self._along, 3).sum(axis=1))
+        chosen = (
+            slice(None)
+            if self.faces is None
+            else indices("ElasticFoundation faces", self.faces, mesh.n_faces)
+        )
+        faces = mesh.faces[chosen]
+        third = _thirds(mesh, faces)
+        row_of = np.unique(faces, return_inverse=True)[1].ravel() if self._is_even else np.arange(faces.size)
+        by_areas = by["shares"].reshape(-1, self._along).sum(axis=1)[row_of]
+        by_third = by_areas[:, None] * third / np.linalg.norm(third, axis=1, keepdims=True)
+        if isinstance(self.direction, str):  # the normal of a spring is that of the sum of its thirds
+            lengths = np.linalg.norm(_summed(third, row_of), axis=1, keepdims=True)
+            by_normals = by["directions"]
+            across = by_normals - normals * (normals * by_normals).sum(axis=1, keepdims=True)
+            by_third = by_third + (across / lengths)[row_of]
+        by_faces = by_third.reshape(-1, 3, 3).sum(axis=1) / 6.0
+        a, b, c = np.moveaxis(mesh.rest_positions[faces], 1, 0)
+        by_b, by_c = np.cross(c - a, by_faces), np.cross(by_faces, b - a)
+        np.add.at(found, faces, np.stack([-by_b - by_c, by_b, by_c], axis=1))
+        return found
+
+    def _core_input(self, label: str, bodies: Bodies, follows: bool) -> dict[str, Any]:
+        """Return the input of the core. follows: whether values that follow from rest positions are parameters there."""
+        span, along = bodies.of(self), self._along
+        vertices, _, numbers, _ = self._lumped(span.mesh)
         nodes = scene_vertices(bodies, self, vertices)
-        if isinstance(self.direction, str):
-            along, directions = 1, normals
-        else:
-            own = axes(self.direction)
-            along, directions = len(own), np.tile(own, (len(vertices), 1))
+        places = self._each_spring(span.mesh)
         return {
             "owner": label,
             "points": [{"vertices": [node], "weights": [1.0]} for node in np.repeat(nodes, along).tolist()],
-            "directions": directions,
-            "grounds": np.repeat(span.mesh.rest_positions[vertices], along, axis=0),
-            "shares": np.repeat(areas, along).tolist(),
+            **places,
+            "shares": places["shares"].tolist(),
             "numbers": np.repeat(numbers, along).tolist(),
             "stiffness_unit": "N/m3",
             "damping_unit": "N s/m3",
+            "has_places": follows,
             **{
                 f"{name}_rows": self._rows(name) for name in ("stiffness", "rest_length", "damping", "ground")
             },
@@ -156,9 +223,14 @@ class FoundationResult(SpringsResult):
     def forces(self) -> Computed:
         """The forces on `vertices`, with those of the dampers in motions, (..., k, 3) N."""
         vertices, areas, numbers, normals = self._springs._lumped(self._span.mesh)
+        ground: Any = self._span.mesh.rest_positions
+        rest = rest_tensor_of(self._result)
+        if rest is not None:
+            ground = rest[self._span.vertices]
+            areas, normals = self._springs._lumped_at(ground, self._span.mesh)
         at = np.arange(len(self._result.scene._bodies.original))[self._span.vertices][vertices]
         positions = self._result.positions[..., at, :]
-        moved = positions - as_operand(self._span.mesh.rest_positions[vertices], positions)
+        moved = positions - as_operand(ground[vertices], positions)
         velocities = self._velocities()
         rates = 0.0 * moved if velocities is None else velocities[..., at, :]
         row_of = np.unique(vertices, return_inverse=True)[1]
@@ -174,6 +246,12 @@ class FoundationResult(SpringsResult):
     @property
     def _span(self) -> Any:
         return self._result.scene._bodies.of(self._springs)
+
+
+def _thirds(mesh: Any, faces: np.ndarray) -> np.ndarray:
+    """Return a third of the area of each face times its normal, for each of its corners, (3 k, 3) m2."""
+    a, b, c = np.moveaxis(mesh.rest_positions[faces], 1, 0)
+    return np.repeat(np.cross(b - a, c - a) / 6.0, 3, axis=0)
 
 
 def _forces(bed: ElasticFoundation, moved: Any, rates: Any, areas: Any, numbers: Any, normals: Any) -> Any:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from ..._input.kinds import Computed, Numbers, SolveResult
     from ..rigid.equimomental_points import RigidBodyPoints
-    from ..scene.values import Gradient
+    from ..scene.values import Gradient, Values
 
     OnBody: TypeAlias = tuple[Shell | Solid | RigidBody, Numbers]
 
@@ -195,6 +195,11 @@ class Spring(Springs):
             own["ground"] = np.array(second[0] if self._one else second)
         return variant(found, **own)
 
+    def _add_numbers(self, label: str, values: Values, numbers: dict[Any, Any]) -> None:
+        super()._add_numbers(label, values, numbers)
+        if self.ground is not None:
+            numbers[label, "ground"] = self.ground
+
     def _by_rest_positions(self, body: Shell | Solid, label: str, gradient: Gradient) -> np.ndarray:
         """Return the gradient by the rest positions of a body, (n_v, 3), through the values that follow from the ends."""
         by_ends = np.zeros((2, len(self), 3))
@@ -203,7 +208,7 @@ class Spring(Springs):
             along = along / np.linalg.norm(along, axis=1, keepdims=True)
             by_ends[1] += gradient.value(label, "rest_length").reshape(-1, 1) * along
             by_ends[0] -= by_ends[1]
-        if "ground" in self._follows and "ground" in self._replaceable:
+        if "ground" in self._follows:
             by_ends[0] += gradient.value(label, "ground").reshape(-1, 3)
         found = np.zeros((body.mesh.n_vertices, 3))
         for owner, points, by_points in zip(self._of, self._ends, by_ends, strict=True):
@@ -238,8 +243,9 @@ class Spring(Springs):
         return embed_points(pairs, bodies, rigid_points, "Spring")
 
     def _core_input(
-        self, label: str, bodies: Bodies, rigid_points: Sequence[RigidBodyPoints]
+        self, label: str, bodies: Bodies, rigid_points: Sequence[RigidBodyPoints], follows: bool
     ) -> dict[str, Any]:
+        """Return the input of the core. follows: whether values that follow from rest positions are parameters there."""
         embedded = self._embedded(bodies, rigid_points)
         grounds = np.broadcast_to(np.zeros(3) if self.ground is None else self.ground, (len(self), 3))
         along = [np.zeros(3)] if self._is_axial else axes(self.direction)
@@ -256,8 +262,10 @@ class Spring(Springs):
             "numbers": np.repeat(np.arange(len(self)), len(along)).tolist(),
             "stiffness_unit": "N/m",
             "damping_unit": "N s/m",
+            "has_places": False,
             **{
-                f"{name}_rows": self._rows(name) for name in ("stiffness", "rest_length", "damping", "ground")
+                f"{name}_rows": self._rows(name, follows)
+                for name in ("stiffness", "rest_length", "damping", "ground")
             },
         }
 

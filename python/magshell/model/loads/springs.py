@@ -59,9 +59,12 @@ class Springs(Owner, ABC):
         shapes = {name: getattr(self, name).shape for name in self._replaceable}
         return {name: gradient.value(label, name).reshape(shape) for name, shape in shapes.items()}
 
-    def _rows(self, name: str) -> int:
-        """Return the number of rows of a value in the core: 0 if there is none of this name."""
-        if name not in self._replaceable:
+    def _rows(self, name: str, follows: bool = False) -> int:
+        """Return the number of rows of a value in the core: 0 if there is none of this name.
+
+        follows: whether it has those values too that follow from rest positions and cannot be replaced.
+        """
+        if name not in self._replaceable and not (follows and name in self._follows):
             return 0
         shape = getattr(self, name).shape
         # A point of the ground is a row of three numbers; every other value is a number. One for all has a dimension less.

@@ -103,6 +103,24 @@ class Skeleton(Frozen):
         skeleton = cls(links, joints)
         return variant(skeleton, named=FixedDict(named))
 
+    def _with_links(self, now: dict[int, RigidBody]) -> tuple[Skeleton, dict[int, RigidBody | Joint]]:
+        """Return the skeleton with other links, and its objects by the ids of those they stand for.
+
+        now: the links in their place, by the ids of those they stand for.
+        """
+        joints = {
+            id(joint): variant(
+                joint,
+                child=now[id(joint.child)],
+                parent=None if joint.parent is None else now[id(joint.parent)],
+            )
+            for joint in self.joints
+        }
+        there: dict[int, RigidBody | Joint] = {**now, **joints}
+        found = Skeleton([now[id(link)] for link in self.links], list(joints.values()))
+        remember(found, named=FixedDict({name: there[id(each)] for name, each in self.named.items()}))
+        return found, there
+
     def _check(self, k: int, joint: Joint) -> None:
         for role in ("child", "parent"):
             link = getattr(joint, role)

@@ -13,9 +13,10 @@ from ..._runtime.frozen import remember, variant
 from ...errors import NoGradient
 from ..actuators.tendon import Tendon
 from ..contact.body_contact import SelfContact
-from ..loads.foundation import ElasticFoundation
+from ..contact.obstacles.attached import Attached
 from ..loads.spring import Spring
 from ..rigid.rigid import RigidBody
+from ..rigid.skeleton import Skeleton
 from ..supports.supports import Clamp, Pin
 from .rest_gradient import without_rest_gradient
 from .scene import Scene
@@ -35,6 +36,7 @@ class ReshapedScene(Scene):
     """
 
     _shares_directions = False
+    _follows_rest_positions = True
 
 
 def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] = ()) -> tuple[Scene, Any]:
@@ -62,12 +64,6 @@ def turning_supports(scene: Scene) -> list[str]:
     supports = getattr(scene, "supports", ())  # what is no Scene is refused later, by the solve
     moved = [support for support in supports if isinstance(support, Pin | Clamp)]
     return ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
-
-
-def rigid_vertices(scene: Scene) -> list[str]:
-    """Return words for vertices of rigid bodies, if any: in motions those have no derivative by their rest positions."""
-    carried = any(part.vertices is not None for part in getattr(scene, "rigid_parts", ()))
-    return ["vertices that belong to a RigidBody"] * carried
 
 
 def without_rest_positions(scene: Scene, values: dict[Any, dict[str, Any]]) -> dict[Any, dict[str, Any]]:
@@ -152,13 +148,25 @@ def _with_rest(
     scene: Scene, numbers: dict[Any, np.ndarray], numbered_like: Scene | None = None
 ) -> ReshapedScene:
     """Make the scene with these rest positions, whose `_stand_ins` are the objects in place of those of the given one."""
-    now = {id(body): body.replaced(rest_positions=x) for body, x in numbers.items()}
+    now: dict[int, Any] = {id(body): body.replaced(rest_positions=x) for body, x in numbers.items()}
     stand_ins: dict[int, Any] = {}
+
+    def link_there(item: RigidBody) -> RigidBody:
+        of = scene.bodies[0] if item.body is None and scene.bodies else item.body
+        found = item._on_reshaped(now, of)
+        if found is not item:
+            now[id(item)] = stand_ins[id(item)] = found
+        return found
 
     def stand_in(item: Any) -> Any:
         if isinstance(item, RigidBody):
-            of = scene.bodies[0] if item.body is None and scene.bodies else item.body
-            found = item._on_reshaped(now, of)
+            return link_there(item)
+        if isinstance(item, Skeleton):
+            links = {id(link): link_there(link) for link in item.links}
+            if all(link is links[id(link)] for link in item.links):
+                return item
+            found, parts = item._with_links(links)
+            stand_ins.update(parts)
         elif isinstance(item, Tendon | Spring):
             found = item._on_reshaped(now)
         else:
@@ -240,10 +248,13 @@ def _tied_vertices(scene: Scene) -> set[tuple[int, ...]]:
 
 
 def _refuse_what_cannot_follow(scene: Scene) -> None:
+    carriers = [each.to for each in scene.obstacles if isinstance(each, Attached)]
     has = (
-        ("joints", scene.joints),
         ("an OwnField", scene.own_field),
-        ("an ElasticFoundation", [load for load in scene.loads if isinstance(load, ElasticFoundation)]),
+        (
+            "an obstacle Attached to a RigidBody with vertices",
+            any(each.vertices is not None for each in carriers),
+        ),
     )
     found = [name for name, some in has if some]
     if found:

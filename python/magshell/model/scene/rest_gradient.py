@@ -20,6 +20,7 @@ from ...mesh.rest_shape import (
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ..actuators.tendon import Tendon
 from ..contact.body_contact import width_of
+from ..loads.foundation import ElasticFoundation
 from ..loads.loads import AreaLoad, EdgeCouple, EdgeLoad
 from ..loads.spring import Spring
 from ..supports.displacement_ties import DisplacementTie
@@ -33,9 +34,6 @@ if TYPE_CHECKING:
     from .values import Gradient, Values
 
 
-_GROWN = ("growth", "rest_curvature")
-
-
 class AtNodes(NamedTuple):
     """Gradients by vertices (n_v, 3) and by the directions across edges (n_d, 3)."""
 
@@ -45,17 +43,7 @@ class AtNodes(NamedTuple):
 
 def without_rest_gradient(scene: Scene) -> list[str]:
     """Return words for everything in a scene that has no derivative by rest positions."""
-    found = []
-    for body in scene.bodies:
-        if isinstance(body.mesh, QuadraticTriangleMesh):
-            found += [
-                f"the {name} of six-node shells" for name in _GROWN if getattr(body, name, None) is not None
-            ]
-    grounded = [load for load in _springs(scene) if "ground" in load._follows and load.body is not None]
-    if any(load.damping is not None for load in grounded):
-        found.append("a Spring with a damper to the ground where it is at rest")
-    # The core knows its terms; words above say why where a term has a derivative in other scenes.
-    return list(dict.fromkeys(found)) or list(dict.fromkeys(_core.without_rest_gradient(scene._model)))
+    return list(dict.fromkeys(_core.without_rest_gradient(scene._model)))
 
 
 def by_rest_positions(inputs: Inputs, body: Shell | Solid, gradient: Gradient) -> np.ndarray:
@@ -76,19 +64,17 @@ def by_rest_positions(inputs: Inputs, body: Shell | Solid, gradient: Gradient) -
     found += _through_contacts(values, body, gradient)
     found += _through_masses(values, values.current(body), span, gradient)
     found += _through_rigid_centers(values, body, gradient)
-    for own in [*_springs(scene), *(each for each in scene.actuators if isinstance(each, Tendon))]:
-        label = next(label for owner, label in scene._labels if owner is own)
-        found += values.current(own)._by_rest_positions(body, label, gradient)
+    for own, label in scene._labels:
+        if isinstance(own, Spring | Tendon):
+            found += values.current(own)._by_rest_positions(body, label, gradient)
+        elif isinstance(own, ElasticFoundation) and scene._bodies.of(own) is span:
+            found += values.current(own)._by_rest_positions(span.mesh, label, gradient)
     for load in map(values.current, scene.loads):
         part = scene._bodies.of(load)
         of_load = np.zeros((scene.mesh.n_vertices, 3))
         of_load[part.vertices] = _through_load(values, load, part, gradient)
         found += of_load[span.vertices]
     return found
-
-
-def _springs(scene: Scene) -> list[Spring]:
-    return [load for load in scene.loads if isinstance(load, Spring)]
 
 
 def _through_rigid_centers(values: Values, body: Shell | Solid, gradient: Gradient) -> np.ndarray:

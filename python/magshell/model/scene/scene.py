@@ -115,6 +115,9 @@ class Scene(PlotMixin):
 
     _replaceable = ("gravity", "vertex_loads")
     _shares_directions = True  # whether edges with equal directions across them share one
+    _follows_rest_positions = (
+        False  # whether numbers of loads that follow from rest positions are values of the core
+    )
     _numbered_like: Scene | None = None  # the scene whose numbering of elements and unknowns this one has
     _rigid_like: Scene | None = None  # the scene whose points of rigid bodies this one has
     _stand_ins: dict[int, Any] = {}  # noqa: RUF012 - in a reshaped scene: {id of an original object: the object in its place}

@@ -113,9 +113,9 @@ def spring_inputs(scene: Scene) -> list[dict[Any, Any]]:
     bodies, found = scene._bodies, []
     for each, label in scene._labels:
         if isinstance(each, Spring):
-            found.append(each._core_input(label, bodies, scene._rigid))
+            found.append(each._core_input(label, bodies, scene._rigid, scene._follows_rest_positions))
         elif isinstance(each, ElasticFoundation):
-            found.append(each._core_input(label, bodies))
+            found.append(each._core_input(label, bodies, scene._follows_rest_positions))
     return found
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from ... import _core
 from ..._runtime.log import log
 from ...errors import NoGradient
-from ...model.loads.springs import Springs
 from ...model.rigid.equimomental_points import own_velocities
 from ...model.scene.reshaped import REST, neighbour
 from ...model.scene.values import Values
@@ -175,8 +174,6 @@ class _Direction:
 
     def _add_rest(self, leaf: Leaf, change: np.ndarray) -> None:
         """Add a change of rest positions: of masses, and of the start where that is the rest shape."""
-        if any(isinstance(load, Springs) and load.damping is not None for load in self._inputs.scene.loads):
-            raise NoGradient(f"no tangent by {REST} of a motion with damped springs; {_ADVICE}")
         model = self._inputs.scene._model
         n_coordinates = 3 * self._inputs.scene._bodies.n_points
 

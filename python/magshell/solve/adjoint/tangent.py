@@ -10,6 +10,8 @@ bodies stay on them, and the forces of the gradient on the free unknowns change 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
@@ -22,7 +24,6 @@ from ...model.scene.values import Values
 from .differences import directional_derivative
 
 if TYPE_CHECKING:
-    from ...model.scene.scene import Scene
     from ...model.scene.solve_inputs import Inputs, Leaf
 
 # The first step as a fraction (1) of the largest entry of a value, and the step of a value that is zero (SI unit of the
@@ -46,6 +47,7 @@ def state_tangent(inputs: Inputs, found: _core.StaticsResult, along: list[np.nda
             )  # sets the branches of angles
             for leaf, change in zip(inputs.leaves, along, strict=True):
                 if np.any(change):
+                    model.set_values(inputs.values.numbers)  # after the differences by another leaf
                     rates = _rates(inputs, found, leaf, change)
                     total[: len(rates)] += rates
         finally:
@@ -80,11 +82,10 @@ def motor_tangent(
                     continue
 
                 def at(step: float, leaf=leaf, each=each) -> np.ndarray:
-                    numbers, load_parameters = changed(inputs, leaf, step * each)
-                    model.set_values(numbers)
-                    return model.driving(state, load_parameters, angle_branches)[None]
+                    with _changed_model(inputs, leaf, step * each) as (there, load_parameters):
+                        return there.driving(state, load_parameters, angle_branches)[None]
 
-                total += _required(directional_derivative(at, steps_along(inputs, leaf, each)))[0]
+                total += _required(directional_derivative(at, _steps(inputs, leaf, each)))[0]
         finally:
             model.set_values(inputs.values.numbers)
     return total
@@ -94,6 +95,30 @@ def _required(derivative: np.ndarray | None) -> np.ndarray:
     if derivative is None:
         raise NoGradient("no tangent of the forces of motors: they are not smooth in the inputs")
     return derivative
+
+
+def _reshapes(leaf: Leaf) -> bool:
+    return leaf.name == REST and leaf.owner is not None
+
+
+def _steps(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> list[float]:
+    return steps_by_rest(leaf, change) if _reshapes(leaf) else steps_along(inputs, leaf, change)
+
+
+@contextmanager
+def _changed_model(
+    inputs: Inputs, leaf: Leaf, change: np.ndarray
+) -> Iterator[tuple[_core.Model, np.ndarray]]:
+    """Yield the model with a changed leaf set, and its load parameters. By rest positions it is that of another scene."""
+    if _reshapes(leaf):
+        values = values_in_neighbour(inputs, leaf, change)
+        with values.in_core():
+            yield values.scene._model, inputs.load_parameters
+    else:
+        model = inputs.scene._model
+        numbers, load_parameters = changed(inputs, leaf, change)
+        model.set_values(numbers)
+        yield model, load_parameters
 
 
 def changed(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -126,41 +151,36 @@ def _added(value, change: np.ndarray) -> np.ndarray:
 def _rates(inputs: Inputs, found: _core.StaticsResult, leaf: Leaf, change: np.ndarray) -> np.ndarray:
     """Return the derivatives of the gradient at the fixed state, and of the increments to what is prescribed, (2, n).
 
-    By a joint, (4, n): also of the state that stays on it, and of the gradient on the free unknowns there, zeros after that.
+    By a joint, or by the rest positions of vertices of rigid bodies, (4, n): also of the state that stays on joints and
+    bodies, and of the gradient on the free unknowns there, zeros after that.
     """
     if leaf.refusal:
         raise NoGradient(f"no tangent by {leaf.name}: {leaf.refusal}")
     model, state, load_parameters = inputs.scene._model, found.state, inputs.load_parameters
-    if leaf.name == REST and leaf.owner is not None:
-        refuse_rigid_vertices(inputs.scene)
-
-        def at(step: float) -> np.ndarray:
-            values = values_in_neighbour(inputs, leaf, step * change)
-            with values.in_core():
-                there = values.scene._model
-                there.term_energies(state, found.angle_branches, load_parameters)
-                return np.stack(
-                    [there.gradient(state, load_parameters), there.driven_increment(state, load_parameters)]
-                )
-
-        rates = directional_derivative(at, steps_by_rest(leaf, change))
-        return rates if rates is not None else _refuse_kink(leaf)
-    moves = isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry
+    reshapes = _reshapes(leaf)
+    if reshapes:
+        moves = any(part.vertices is not None for part in inputs.scene.rigid_parts)
+    else:
+        moves = isinstance(leaf.owner, Joint) and leaf.name in leaf.owner._geometry
     gradient = model.gradient(state, load_parameters) if moves else np.zeros(0)
     # The gradient on the free unknowns and the increments of motors vanish by cancellation: of all forces, and of places.
     forces_and_places = np.abs(gradient).max(initial=0.0), np.abs(state).max(initial=0.0)
     sizes = np.array([1.0 / each if each > 0.0 else 0.0 for each in forces_and_places])[[0, 1, 1, 0]]
 
-    def at(step: float) -> np.ndarray:
-        numbers, load_parameters = changed(inputs, leaf, step * change)
-        model.set_values(numbers)
-        forces = model.gradient(state, load_parameters)
+    def rows(there: _core.Model, load_parameters: np.ndarray) -> np.ndarray:
+        forces = there.gradient(state, load_parameters)
         if not moves:
-            return np.stack([forces, model.driven_increment(state, load_parameters)])
-        moved, driven, free = _core.state_on_joints(model, state, load_parameters, gradient)
+            return np.stack([forces, there.driven_increment(state, load_parameters)])
+        moved, driven, free = _core.state_on_joints(there, state, load_parameters, gradient)
         return np.stack([forces, driven, moved, np.pad(free, (0, len(state) - len(free)))])
 
-    rates = directional_derivative(at, steps_along(inputs, leaf, change), sizes=sizes if moves else None)
+    def at(step: float) -> np.ndarray:
+        with _changed_model(inputs, leaf, step * change) as (there, load_parameters):
+            if reshapes:
+                there.term_energies(state, found.angle_branches, load_parameters)
+            return rows(there, load_parameters)
+
+    rates = directional_derivative(at, _steps(inputs, leaf, change), sizes=sizes if moves else None)
     return rates if rates is not None else _refuse_kink(leaf)
 
 
@@ -180,14 +200,6 @@ def values_in_neighbour(inputs: Inputs, leaf: Leaf, change: np.ndarray) -> Value
     there = neighbour(inputs.scene, {body: body.mesh.rest_positions + change})
     replaced = {there._own(owner): named for owner, named in inputs.values.replaced.items()}
     return Values(there, replaced, inputs.magnetization, sampling_of=inputs.values)
-
-
-def refuse_rigid_vertices(scene: Scene) -> None:
-    """Raise NoGradient if rigid bodies carry vertices, whose places in them follow the rest positions."""
-    if any(part.vertices is not None for part in scene.rigid_parts):
-        raise NoGradient(
-            f"no tangent by {REST} of scenes in which vertices belong to a RigidBody; take gradients with backward()"
-        )
 
 
 def steps_by_rest(leaf: Leaf, change: np.ndarray) -> list[float]:

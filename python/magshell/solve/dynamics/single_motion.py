@@ -20,7 +20,7 @@ from ...model.fields.magnet_overlap import describe_magnet_overlap
 from ...model.scene.field_sampling import sampling_errors, warn_of_sampling
 from ...model.scene.fine_faces import fine_faces
 from ...model.scene.replacements import requested
-from ...model.scene.reshaped import reshaped, rigid_vertices, turning_supports
+from ...model.scene.reshaped import reshaped, turning_supports
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.values import Values
@@ -215,7 +215,7 @@ def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
     Raises ValueError too for a state from which the motion cannot go on with these.
     """
     last = vars(scene).get("_reshaped", (None, scene))[1]
-    there, values = reshaped(scene, values, no_gradient_with=turning_supports(scene) + rigid_vertices(scene))
+    there, values = reshaped(scene, values, no_gradient_with=turning_supports(scene))
     if there not in (scene, last) and isinstance(start, MotionState | DifferentiableState):
         raise ValueError(
             "start is the state of a motion at other rest_positions: hand over its "
