@@ -45,6 +45,8 @@ struct JointCoordinate {
     std::vector<Product> products = {}, sines = {};
     Vec3 along = Vec3::Zero();       // a
     double top = 0.0, cosine = 0.0;  // cosine: c
+    Vec3 slide =
+        Vec3::Zero();  // of a screw's angle: a / h, whose product with o_c - o_p counts the full turns
 };
 
 /// A quantity whose rate a damper acts against, with its share of the damping.

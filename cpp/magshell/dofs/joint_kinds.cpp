@@ -144,6 +144,11 @@ class ScrewJoint final : public RevoluteJoint {
                      turned = RevoluteJoint::coordinate(joint, parent, child);
         return slid + std::remainder(turned - slid, 2.0 * std::numbers::pi);
     }
+    JointCoordinate form(const Joint& joint) const override {
+        JointCoordinate coordinate = RevoluteJoint::form(joint);
+        coordinate.slide = joint.axis / joint.numbers[0];
+        return coordinate;
+    }
     // The rotation is about the origin as a point of the child, and the translation changes with the axis.
     Vec3 axis_gradient(const Joint& joint, double s, double rate, const JointSums& sums) const override {
         const double pitch = joint.numbers[0];

@@ -64,6 +64,17 @@ def test_servo_holds_a_load_within_its_limits():
     assert depth == pytest.approx(2.0 * G * PITCH / 1e3 + 5e-5, rel=1e-4)
 
 
+@pytest.mark.parametrize("turned", [-30.0, 55.0])
+def test_spring_counts_all_turns_of_one_solve(turned):
+    """Check the angle and the energy of a nut whose weight and spring are in balance after several turns."""
+    stiffness = 0.02
+    rest_angle = turned + 2.0 * G * PITCH / stiffness
+    scene, screw, _ = nut(spring_stiffness=stiffness, rest_angle=rest_angle)
+    found = ms.equilibrium(scene)
+    assert float(found[screw].angle) == pytest.approx(turned, rel=1e-8)
+    assert found.energies["joints"] == pytest.approx(0.5 * stiffness * (turned - rest_angle) ** 2, rel=1e-8)
+
+
 def train(**first):
     """Return (scene, joints, links) of a screw on a screw on a free link, with a rod on a hinge at the end."""
     links = [

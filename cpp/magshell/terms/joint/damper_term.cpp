@@ -13,11 +13,14 @@ DamperTerm::DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>
         const double reach = length ? links.reach() : 1.0 + links.reach() / links.length();
         const ParameterSlice axis =
             input.joint.has_axis() ? registry.values.add(input.owner, "axis", "1", 1, 3) : ParameterSlice{};
+        std::vector<ParameterSlice> numbers;
+        for (const auto& [name, unit] : input.joint.traits().numbers)
+            numbers.push_back(registry.values.add(input.owner, name, unit, 1, 1));
         std::size_t number = 0;
         for (const JointStrain& strain : input.joint.kind->damped(input.joint)) {
             const JointForm form(strain.coordinate, input.joint.origin, links);
             each_.push_back({links, form, strain.share, slice, axis, input.joint, number++, length,
-                             form.at(links.rest()).first.cwiseAbs(), reach});
+                             form.at(links.rest()).first.cwiseAbs(), reach, numbers});
         }
     }
     last_turn_.assign(each_.size(), 0.0);
@@ -29,8 +32,17 @@ bool DamperTerm::set_values(const Values& values) {
     for (Each& each : each_) {
         changed |= values.changed(each.slice);
         each.damping = each.share * values.number(each.slice);
-        if (each.axis.size() == 0 || !values.changed(each.axis)) continue;
-        each.joint.axis = values.vector(each.axis);
+        bool other_form = false;
+        if (each.axis.size() > 0 && values.changed(each.axis)) {
+            each.joint.axis = values.vector(each.axis);
+            other_form = true;
+        }
+        for (std::size_t n = 0; n < each.numbers.size(); ++n) {
+            if (!values.changed(each.numbers[n])) continue;
+            each.joint.numbers[n] = values.number(each.numbers[n]);
+            other_form = true;
+        }
+        if (!other_form) continue;
         each.form = JointForm(each.joint.kind->damped(each.joint)[each.number].coordinate, each.joint.origin,
                               each.links);
         each.at_rest = each.form.at(each.links.rest()).first.cwiseAbs();

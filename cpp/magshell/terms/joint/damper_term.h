@@ -66,7 +66,9 @@ class DamperTerm final : public DampedTerm {
         std::size_t number;  // among the strains of the joint
         bool length;
         JointForm::Corners at_rest;  // |ds/dx|
-        double reach, damping = 0.0;
+        double reach;
+        std::vector<ParameterSlice> numbers;  // of a kind that has some: the pitch of a screw
+        double damping = 0.0;
     };
     double strain(std::size_t k, const JointForm::Corners& at) const {
         return each_[k].form.value(at, last_turn_[k]);

@@ -17,6 +17,10 @@ JointForm::JointForm(const JointCoordinate& coordinate, const Vec3& origin, cons
     if (!coordinate.along.isZero(0.0))
         form_.add(links.vector(false, coordinate.along),
                   links.point(true, origin) - links.point(false, origin));
+    slides_ = !coordinate.slide.isZero(0.0);
+    if (slides_)
+        slide_.add(links.vector(false, coordinate.slide),
+                   links.point(true, origin) - links.point(false, origin));
 }
 
 JointForm JointForm::product(const LinkPair& links, const Vec3& of_parent, const Vec3& of_child) {
@@ -38,7 +42,8 @@ double JointForm::value(const Corners& at) const {
 
 double JointForm::value(const Corners& at, double near) const {
     const double own = value(at);
-    return angle_ ? near + std::remainder(own - near, 2.0 * std::numbers::pi) : own;
+    const double turns = slides_ ? slide_.value(at) : near;
+    return angle_ ? turns + std::remainder(own - turns, 2.0 * std::numbers::pi) : own;
 }
 
 JointForm::Local JointForm::at(const Corners& at) const {

@@ -41,13 +41,14 @@ class JointForm {
     bool angle() const { return angle_; }
     /// Returns the coordinate; an angle lies in [-pi, pi].
     double value(const Corners& at) const;
-    /// Returns the coordinate; an angle is taken on the branch nearest to `near`.
+    /// Returns the coordinate; an angle is taken on the branch nearest to `near`, and a screw's on that of its displacement.
     double value(const Corners& at, double near) const;
     Local at(const Corners& at) const;
 
   private:
-    bool angle_ = false;
+    bool angle_ = false, slides_ = false;
     CornerForm form_, sine_;  // for an angle: cosine and sine
+    CornerForm slide_;        // of a screw: the displacement over the pitch
 };
 
 }  // namespace magshell

@@ -60,6 +60,7 @@ class JointTerm final : public Term {
         std::vector<ParameterSlice> slices;  // of the law; the stiffness of a loop closure
         ParameterSlice
             geometry;  // parameter of the form: axis, origin of a loop closure, or a servo's target rotation
+        std::vector<ParameterSlice> numbers;  // of a kind that has some: the pitch of a screw
         Vec3 target_rotation = Vec3::Zero();  // rotation vector [rad]
         JointLaw law;
         double stiffness = 0.0;  // of a loop closure
