@@ -42,7 +42,7 @@ Entries selected(const Entries& entries, const std::vector<bool>& marked) {
 }  // namespace
 
 OwnField::OwnField(Faces faces, const Triangles& triangles, const std::vector<RigidNodes>& rigid)
-    : n_tetrahedra_(triangles.n_tetrahedra) {
+    : n_tetrahedra_(static_cast<Index>(triangles.rotates.size())) {
     const Index n = static_cast<Index>(faces.nodes.size());
     for (const std::array<Index, 3>& corners : faces.nodes)
         nodes_.insert(nodes_.end(), corners.begin(), corners.end());
@@ -107,6 +107,7 @@ OwnField::OwnField(Faces faces, const Triangles& triangles, const std::vector<Ri
         element.turns = {1.0, -1.0};
         element.area = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]);
     }
+    collect_rotating(triangles);
     rigid_of_node_.assign(nodes_.size(), -1);
     for (const RigidNodes& body : rigid) {
         Dipole& dipole = dipoles_.emplace_back();
@@ -114,6 +115,27 @@ OwnField::OwnField(Faces faces, const Triangles& triangles, const std::vector<Ri
         for (const Index node : body.nodes)
             if (const Index k = local(node); k < static_cast<Index>(nodes_.size()) && nodes_[k] == node)
                 rigid_of_node_[k] = static_cast<Index>(dipoles_.size()) - 1;
+    }
+}
+
+void OwnField::collect_rotating(const Triangles& triangles) {
+    std::vector<Index> places(triangles.rotates.size(), -1);
+    for (Index t = 0; t < n_tetrahedra_; ++t)
+        if (triangles.rotates[t]) {
+            places[t] = static_cast<Index>(rotating_.size());
+            rotating_.push_back({.number = t});
+        }
+    const Index first = static_cast<Index>(elements_.size() - triangles.nodes.size());
+    for (std::size_t k = 0; k < triangles.nodes.size(); ++k) {
+        const Index e = first + static_cast<Index>(k);
+        const std::array<Vec3, 3>& x = triangles.rest[k];
+        for (int side = 0; side < 2; ++side) {
+            const Index t = triangles.tetrahedra[k][side];
+            if (t < 0 || places[t] < 0) continue;
+            Tetrahedron& tetrahedron = rotating_[places[t]];
+            tetrahedron.sides.push_back({e, elements_[e].turns[side] * elements_[e].area});
+            tetrahedron.volume += tetrahedron.sides.back().area.dot(x[0] + x[1] + x[2]) / 9.0;
+        }
     }
 }
 
@@ -149,10 +171,17 @@ void OwnField::set(const std::vector<Vec3>& magnetization, const std::vector<dou
                 std::max(largest[face.edges[i]], thickness[f] * m.norm() * face.conormals[i].norm());
         }
     }
+    std::vector<bool> rotates(n_tetrahedra_, false);
+    for (Tetrahedron& tetrahedron : rotating_) {
+        rotates[tetrahedron.number] = true;
+        tetrahedron.magnetization = of_tetrahedra[tetrahedron.number];
+        for (const Tetrahedron::Side& side : tetrahedron.sides)
+            if (tetrahedron.magnetization != Vec3::Zero()) has_charge_[side.element] = true;
+    }
     for (Index e = 0; e < n_elements; ++e) {
         const Element& element = elements_[e];
         for (int side = 0; side < 2 && !element.is_edge(); ++side) {
-            if (element.bodies[side] < 0) continue;
+            if (element.bodies[side] < 0 || rotates[element.bodies[side]]) continue;
             const Vec3& m = of_tetrahedra[element.bodies[side]];
             charges_[e] += element.turns[side] * m.dot(element.area);
             largest[e] = std::max(largest[e], m.norm() * element.area.norm());
@@ -202,6 +231,12 @@ OwnField OwnField::of_sources() const {
     part.nodes_ = selected(nodes_, nodes);
     part.elements_ = selected(elements_, elements);
     part.n_tetrahedra_ = n_tetrahedra_;
+    for (const Tetrahedron& tetrahedron : rotating_)
+        if (tetrahedron.magnetization != Vec3::Zero()) {
+            part.rotating_.push_back(tetrahedron);
+            for (Tetrahedron::Side& side : part.rotating_.back().sides)
+                side.element = element_numbers[side.element];
+        }
     part.dipoles_ = dipoles_;
     for (Dipole& dipole : part.dipoles_)
         for (Index& node : dipole.nodes) node = node_numbers[node];
@@ -235,7 +270,8 @@ OwnField OwnField::of_sources() const {
 
 std::size_t OwnField::bytes() const {
     return nodes_.size() * sizeof(Index) + elements_.size() * (sizeof(Element) + 2 * sizeof(double)) +
-           faces_.size() * (sizeof(Face) + sizeof(Vec3) + 3 * sizeof(double));
+           faces_.size() * (sizeof(Face) + sizeof(Vec3) + 3 * sizeof(double)) +
+           rotating_.size() * (sizeof(Tetrahedron) + 4 * sizeof(Tetrahedron::Side));
 }
 
 }  // namespace magshell

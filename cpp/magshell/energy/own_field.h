@@ -22,6 +22,9 @@
 //
 //   Q_t = a~_t . (M~_1 - M~_2)      a~_t: area vector at rest, out of the tetrahedron 1 into 2
 //
+// A tetrahedron whose magnetization rotates without stretching, R M~ / J, has U^-1 M~ instead of M~ (energy/unstretched_solid_vector.h),
+// with its mean deformation gradient F = R U = sum_t xbar_t a~_t^T / V~, a sum over its triangles of centers xbar_t.
+//
 // A charge is uniform on its triangle: four points, 16 where triangles or edges are near, and the closed form of its energy with itself.
 //
 // Rigid bodies with a magnetic moment are point dipoles in the field of all elements and of each other.
@@ -54,7 +57,8 @@ class OwnField {
         std::vector<std::array<Index, 3>> nodes;
         std::vector<std::array<Vec3, 3>> rest;
         std::vector<std::array<Index, 2>> tetrahedra;
-        Index n_tetrahedra = 0;
+        std::vector<bool>
+            rotates;  // of each tetrahedron, whether its magnetization rotates without stretching
     };
     /// A rigid body with a moment: all of its nodes, first the corners x_k of its tetrahedron. The dipole m = sum moment_k x_k is at
     /// sum position_k x_k.
@@ -154,6 +158,17 @@ class OwnField {
         std::array<double, 4> inverse;                    // of the edges at rest in the basis; by rows
         std::array<std::array<double, 2>, 3> in_plane{};  // the conormals in the basis
     };
+    /// A tetrahedron whose magnetization rotates without stretching, with its triangles.
+    struct Tetrahedron {
+        struct Side {
+            Index element;
+            Vec3 area;  // outward at rest [m2]
+        };
+        Index number = 0;
+        std::vector<Side> sides{};
+        double volume = 0.0;          // at rest [m3]
+        Vec3 magnetization{0, 0, 0};  // [A/m]
+    };
     struct Dipole {
         std::array<Index, 4> nodes;  // local
         DipoleWeights weights;
@@ -195,6 +210,8 @@ class OwnField {
     /// Where sums are evaluated: at the sources, or at all elements and faces, for derivatives with respect to values that are zero now.
     enum class Targets { sources, all };
 
+    /// Collects the tetrahedra whose magnetization rotates, with their triangles.
+    void collect_rotating(const Triangles& triangles);
     Index target_elements(Targets at) const {
         return at == Targets::all ? static_cast<Index>(elements_.size()) : active_elements_;
     }
@@ -240,20 +257,24 @@ class OwnField {
     void add_dipoles(const Geometry<T>& at, Targets targets, Evaluation<T>& out) const;
     template <class T>
     void add_self(const Geometry<T>& at, Index element, ElementAdjoint<T>& out) const;
+    /// Adds the derivatives by the charges of tetrahedra whose magnetization rotates to those by the nodes of elements.
+    template <class T>
+    void collect_charges(const Geometry<T>& at, Evaluation<T>& out) const;
     template <class T>
     void collect(const Geometry<T>& at, Evaluation<T>& out) const;
 
     std::vector<Index> nodes_;       // local -> node of the scene
     std::vector<Element> elements_;  // edges, then triangles
     Index n_tetrahedra_ = 0;
+    std::vector<Tetrahedron> rotating_;  // those whose magnetization rotates without stretching
     std::vector<Dipole> dipoles_;
     std::vector<Index> rigid_of_node_;  // the dipole whose rigid body a local node belongs to; -1: none
     std::vector<Face> faces_;
     std::vector<Index> element_order_, face_order_;  // those with a source first
     Index active_elements_ = 0;                      // number of those with a source
     Index active_faces_ = 0;                         // number of faces with a normal magnetization
-    std::vector<double> charges_;   // Q [A m] of faces whose magnetization stretches and of tetrahedra
-    std::vector<bool> has_charge_;  // of elements
+    std::vector<double> charges_;            // Q [A m] of faces and tetrahedra whose magnetization stretches
+    std::vector<bool> has_charge_;           // of elements
     std::vector<double> element_thickness_;  // of elements [m]
     std::vector<double> thickness_;          // of faces [m]
     std::vector<double> rest_currents_;      // h_f (M~_f . n~_f) [A]

@@ -9,6 +9,7 @@
 #include "magshell/energy/own_field.h"
 #include "magshell/energy/own_field_pairs.h"
 #include "magshell/energy/source_tree.h"
+#include "magshell/energy/unstretched_solid_vector.h"
 #include "magshell/energy/unstretched_vector.h"
 #include "magshell/field/dipoles.h"
 
@@ -109,6 +110,11 @@ struct OwnField::Geometry {
                 if (face.edges[i] >= 0)
                     charges[face.edges[i]] += T(face.in_plane[i][0]) * m[0] + T(face.in_plane[i][1]) * m[1];
         }
+        for (const Tetrahedron& tetrahedron : f.rotating_) {
+            const Triple<T> m = unstretched(tetrahedron)(lifted(tetrahedron.magnetization));
+            for (const Tetrahedron::Side& side : tetrahedron.sides)
+                charges[side.element] += dot(lifted(side.area), m);
+        }
         for (std::size_t k = 0; k < f.elements_.size(); ++k) {
             const Element& element = f.elements_[k];
             if (!element.is_edge()) continue;
@@ -125,6 +131,23 @@ struct OwnField::Geometry {
     UnstretchedVector<T> unstretched(const Face& face) const {
         const Triple<T>& origin = x[face.nodes[0]];
         return {{x[face.nodes[1]] - origin, x[face.nodes[2]] - origin}, face.inverse};
+    }
+    static Triple<T> lifted(const Vec3& m) { return {T(m.x()), T(m.y()), T(m.z())}; }
+    UnstretchedSolidVector<T> unstretched(const Tetrahedron& tetrahedron) const {
+        std::array<Triple<T>, 3> f{};
+        for (const Tetrahedron::Side& side : tetrahedron.sides) {
+            const Triple<T> center = middle(field.elements_[side.element]);
+            for (int c = 0; c < 3; ++c) f[c] += T(side.area[c] / tetrahedron.volume) * center;
+        }
+        return UnstretchedSolidVector<T>(f);
+    }
+    // Returns sum a~_t dE/dQ_t over the triangles of a tetrahedron: the gradient with respect to U^-1 M~, in which Q_t is linear.
+    Triple<T> by_charges(const Tetrahedron& tetrahedron,
+                         const std::vector<ElementAdjoint<T>>& elements) const {
+        Triple<T> sum;
+        for (const Tetrahedron::Side& side : tetrahedron.sides)
+            sum += elements[side.element].charge * lifted(side.area);
+        return sum;
     }
     // Returns sum l~_e nu~_e dE/dQ_e over the edges of a face, in the basis of its plane: the gradient with respect to h M~, or by
     // h U^-1 M~ of a face that rotates, in which Q_e is linear. l~_e: length at rest, nu~_e: outward conormal at rest,

@@ -97,9 +97,24 @@ void OwnField::add_self(const Geometry<T>& at, Index element, ElementAdjoint<T>&
     }
 }
 
+template <class T>
+void OwnField::collect_charges(const Geometry<T>& at, Evaluation<T>& out) const {
+    for (const Tetrahedron& tetrahedron : rotating_) {
+        const std::array<Triple<T>, 3> by_f =
+            at.unstretched(tetrahedron)
+                .by_columns(at.by_charges(tetrahedron, out.elements), at.lifted(tetrahedron.magnetization));
+        for (const Tetrahedron::Side& side : tetrahedron.sides) {
+            Triple<T> by_center;
+            for (int c = 0; c < 3; ++c) by_center += T(side.area[c] / tetrahedron.volume) * by_f[c];
+            at.add_by_middle(elements_[side.element], by_center, out.elements[side.element]);
+        }
+    }
+}
+
 // Carries the derivatives with respect to normals and currents on to the positions of the nodes.
 template <class T>
 void OwnField::collect(const Geometry<T>& at, Evaluation<T>& out) const {
+    collect_charges(at, out);
     out.by_position.assign(nodes_.size(), {});
     for (std::size_t e = 0; e < elements_.size(); ++e) {
         const Element& element = elements_[e];
@@ -209,10 +224,16 @@ OwnField::FaceGradient OwnField::vjp(const double* q, const double* lambda) cons
                 (elements_[face.edges[i]].bodies[1] < 0 ? 1.0 : 0.5) * rate_of(element.thickness);
         }
     }
+    std::vector<bool> rotates(n_tetrahedra_, false);
+    for (const Tetrahedron& tetrahedron : rotating_) {
+        rotates[tetrahedron.number] = true;
+        by.of_tetrahedra[tetrahedron.number] =
+            rates_of(at.unstretched(tetrahedron)(at.by_charges(tetrahedron, found.elements)));
+    }
     for (std::size_t e = 0; e < elements_.size(); ++e) {
         const Element& element = elements_[e];
         for (int side = 0; side < 2 && !element.is_edge(); ++side)
-            if (element.bodies[side] >= 0)
+            if (element.bodies[side] >= 0 && !rotates[element.bodies[side]])
                 by.of_tetrahedra[element.bodies[side]] +=
                     (element.turns[side] * rate_of(found.elements[e].charge)) * element.area;
     }

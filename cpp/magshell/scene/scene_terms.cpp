@@ -262,7 +262,8 @@ void Builder::add_own_field(const SceneInput& input) {
         sources.sheets.emplace_back(
             *bodies_.faces()[input.shells.size() + input.solids.size() + skin].surface,
             input.skins[skin].magnetization_law);
-    for (const Index solid : given.solids) sources.solids.push_back(bodies_.solids()[solid]);
+    for (const Index solid : given.solids)
+        sources.solids.push_back({bodies_.solids()[solid], input.solids[solid].magnetization_law});
     for (const Index part : given.rigid)
         sources.magnets.push_back({input.rigid[part].owner, bodies_.rigid_nodes()[part]});
     std::unique_ptr<OwnFieldTerm> term = std::make_unique<OwnFieldTerm>(

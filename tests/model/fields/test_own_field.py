@@ -358,15 +358,23 @@ def test_shell_without_magnetization_is_refused():
         ms.equilibrium(scene, progress=False)
 
 
-@pytest.mark.parametrize("question", ["vibration", "buckling"])
-def test_linear_questions_name_what_works_with_the_own_field(question):
+def test_hessians_as_matrices_name_what_works_with_the_own_field():
     scene = flaps(4e-3, 1e6, own_field=ms.OwnField())
-    rest = ms.equilibrium(scene, remanent_magnetization=(6e4, 0, 0), progress=False)
     with pytest.raises(ValueError, match="can be computed with own_field"):
-        if question == "vibration":
-            ms.vibration_modes(scene, rest)
-        else:
-            ms.linear_buckling(scene, remanent_magnetization=(6e4, 0, 0))
+        ms.hessian(scene, scene.mesh.rest_positions, remanent_magnetization=(6e4, 0, 0))
+
+
+def test_a_scene_that_supports_hold_throughout_has_its_own_field():
+    mesh = ms.meshes.rectangle(SIZE, SIZE, cells=(2, 2))
+    meshes = [mesh, mesh.transformed(translation=(0, 0, 1e-3 + THICKNESS))]
+    plates = [ms.Shell(each, thickness=THICKNESS, young_modulus=1e9, bending="hinge") for each in meshes]
+    held = [ms.Pin(np.arange(mesh.n_vertices), body=plate) for plate in plates]
+    scene = ms.Scene(plates, supports=held, own_field=MANY)
+    magnetization = POLARIZATION / VACUUM_PERMEABILITY
+    found = ms.equilibrium(scene, remanent_magnetization=(magnetization, 0, 0), progress=False)
+    assert found.stable and found.energies["own field"] != 0.0
+    force = ms.field_of(found).magnetic_force(plates[1])
+    assert force[2] > 1e-5
 
 
 def test_force_torque_and_energies_of_two_plates_are_consistent():

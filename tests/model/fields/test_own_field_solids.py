@@ -90,21 +90,26 @@ def test_force_of_a_plate_on_a_solid_equals_the_closed_form():
         np.testing.assert_allclose(found, exact, rtol=0, atol=2e-3 * np.abs(exact).max())
 
 
+LAWS = ["stretches", "rotates"]
+
+
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
-def test_stretched_cubes_keep_their_charges(element):
-    """Check stretched cubes against cuboids of their size with the same charges."""
+def test_stretched_cubes_have_the_charges_of_their_law(element, law):
+    """Check stretched cubes against cuboids of their size: with the same charges, or with the same moment."""
     stretch, polarization = np.array([0.8, 0.9, 1.3]), 0.5
     offset = np.array([0, 0, 0.024])
     magnetization = (0, 0, polarization / VACUUM_PERMEABILITY)
     cubes = [
-        block((SIDE,) * 3, (4, 4, 4), center, magnetization, element)
+        block((SIDE,) * 3, (4, 4, 4), center, magnetization, element, magnetization_law=law)
         for center in ((0, 0, 0), offset / stretch)
     ]
-    scene = free_scene(cubes)
+    scene = free_scene(cubes, max_points=10**5)
     _, gradient = evaluated(scene, scene.mesh.rest_positions * stretch)
     found = -gradient[cubes[0].mesh.n_vertices :].sum(axis=0)
     now = SIDE * stretch
-    exact = cuboid_force(now, now, offset, 2, polarization * SIDE**2 / (now[0] * now[1]))
+    polarization *= SIDE**2 / (now[0] * now[1]) if law == "stretches" else SIDE**3 / now.prod()
+    exact = cuboid_force(now, now, offset, 2, polarization)
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-3 * np.abs(exact).max())
 
 
@@ -119,13 +124,13 @@ def test_own_energy_of_a_cube_tends_to_that_of_its_demagnetizing_factor():
     assert errors[-1] < 1e-2 and errors[0] > errors[1] > errors[2]
 
 
-def crumpled(element="linear", seed=0, accuracy=1e-6):
+def crumpled(element="linear", seed=0, accuracy=1e-6, law="stretches"):
     """Return a scene of a shell, a solid and a solid with a skin, its positions, and its magnetization."""
     rng = np.random.default_rng(seed)
     cells = (2, 2, 1) if element == "linear" else (1, 1, 1)
     mesh = ms.meshes.rectangle(SIDE, SIDE, cells=(3, 3)).transformed(translation=(-4e-3, -6e-3, 6.5e-3))
     shell = ms.Shell(mesh, thickness=5e-4, young_modulus=1e6)
-    solid = block((SIDE, SIDE, 0.6 * SIDE), cells, element=element)
+    solid = block((SIDE, SIDE, 0.6 * SIDE), cells, element=element, magnetization_law=law)
     solid = solid.replaced(remanent_magnetization=1e5 * rng.normal(size=(solid.mesh.n_tetrahedra, 3)))
     core = ms.meshes.box((SIDE, SIDE, SIDE), cells=cells).transformed(translation=(7e-3, 1e-3, -2e-3))
     coat = ms.Skin(thickness=5e-4, faces=np.arange(6), remanent_magnetization=1e5 * rng.normal(size=(6, 3)))
@@ -144,18 +149,20 @@ def scene_magnetization(scene, shell, skinned, rng):
     return rows
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
-def test_force_and_torque_of_shells_solids_and_skins_vanish(element):
-    scene, positions, magnetization = crumpled(element)
+def test_force_and_torque_of_shells_solids_and_skins_vanish(element, law):
+    scene, positions, magnetization = crumpled(element, law=law)
     _, gradient = evaluated(scene, positions, magnetization)
     total = np.linalg.norm(gradient, axis=1).sum()
     assert np.linalg.norm(gradient.sum(axis=0)) < 1e-14 * total
     assert np.linalg.norm(np.cross(positions, gradient).sum(axis=0)) < 1e-14 * total * SIDE
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
-def test_gradient_and_hessian_product_of_solids_agree_with_differences(element):
-    scene, positions, magnetization = crumpled(element)
+def test_gradient_and_hessian_product_of_solids_agree_with_differences(element, law):
+    scene, positions, magnetization = crumpled(element, law=law)
     direction = np.random.default_rng(1).normal(size=positions.shape)
     step = 1e-7
 
@@ -171,18 +178,24 @@ def test_gradient_and_hessian_product_of_solids_agree_with_differences(element):
     assert np.abs(change - product).max() < 1e-7 * np.abs(product).max()
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
-def test_derivatives_by_the_magnetization_of_every_tetrahedron_agree_with_differences(element):
+def test_derivatives_by_the_magnetization_of_every_tetrahedron_agree_with_differences(element, law):
     solids = [
-        block((SIDE,) * 3, (1, 1, 1), center, element=element) for center in ((0, 0, 0), (0, 2e-3, 0.014))
+        block((SIDE,) * 3, (1, 1, 1), center, element=element, magnetization_law=law)
+        for center in ((0, 0, 0), (0, 2e-3, 0.014))
     ]
+    bent = None
     rng = np.random.default_rng(2)
     change, adjoint = 1e4 * rng.normal(size=(solids[1].mesh.n_tetrahedra, 3)), None
 
     def along(m):
         nonlocal adjoint
+        nonlocal bent
         scene = free_scene([solids[0], solids[1].replaced(remanent_magnetization=m)])
-        _, gradient = evaluated(scene)
+        rest = scene.mesh.rest_positions
+        bent = rest + 5e-4 * np.random.default_rng(6).normal(size=rest.shape)
+        _, gradient = evaluated(scene, bent)
         adjoint = np.random.default_rng(3).normal(size=gradient.shape) if adjoint is None else adjoint
         return np.sum(adjoint * gradient)
 
@@ -192,7 +205,7 @@ def test_derivatives_by_the_magnetization_of_every_tetrahedron_agree_with_differ
     scene = free_scene([solids[0], solids[1].replaced(remanent_magnetization=base)])
     inputs = Inputs(scene, None, None)
     with inputs.in_core():
-        state = scene._model.rest_state()
+        state = scene._model.state(bent, np.zeros(scene._bodies.n_rotations))
         full = scene._model.state(adjoint, np.zeros(scene._bodies.n_rotations))
         found = _core.vjp(scene._model, state, inputs.load_parameters, full)[0]
     rows = scene._value_layout.of(found, "body 1", "remanent_magnetization")
@@ -313,9 +326,6 @@ def test_scene_refuses_solids_without_a_supported_own_field():
         free_scene(plain)
     with pytest.raises(ValueError, match="body 0, a Solid without magnetization"):
         free_scene(plain, bodies=plain)
-    turning = block((SIDE,) * 3, (1, 1, 1), magnetization_law="rotates")
-    with pytest.raises(ValueError, match='a Solid with magnetization_law="rotates"'):
-        free_scene(turning)
     coat = ms.Skin(thickness=1e-4, remanent_magnetization=(1e4, 0, 0))
     with pytest.raises(ValueError, match="magnetized throughout and has a skin"):
         free_scene(block((SIDE,) * 3, (1, 1, 1), skin=coat))
@@ -323,6 +333,34 @@ def test_scene_refuses_solids_without_a_supported_own_field():
     shell = ms.Shell(ms.meshes.rectangle(SIDE, SIDE, cells=(1, 1)), thickness=1e-3, young_modulus=1e6)
     with pytest.raises(ValueError, match="names a Solid that is not among the bodies"):
         free_scene(shell, bodies=other)
-    everywhere = ms.Pin(np.arange(other.mesh.n_vertices))
-    with pytest.raises(ValueError, match="supports hold all vertices"):
-        ms.Scene(other, supports=everywhere, own_field=ms.OwnField())
+
+
+def test_uniform_rotating_magnetization_has_its_charges_on_the_surface_at_rest():
+    energies = [
+        evaluated(free_scene(block((SIDE,) * 3, (3, 3, 3), magnetization_law=law), max_points=10**5))[0]
+        for law in LAWS
+    ]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-12)
+
+
+def test_derivatives_hold_where_a_body_is_turned_far_and_stretched():
+    """Check the rotation of large deformations, for which its iteration takes many steps."""
+    solid = block((SIDE,) * 3, (1, 1, 1), magnetization=(5e4, -3e4, 8e4), magnetization_law="rotates")
+    scene = free_scene(solid)
+    turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    rest = scene.mesh.rest_positions
+    positions = rest @ np.diag([6.0, 0.2, 1.5]) @ turn
+    alone = rest @ np.diag([6.0, 0.2, 1.5])
+    assert evaluated(scene, positions)[0] == pytest.approx(evaluated(scene, alone)[0], rel=1e-12)
+    direction = np.random.default_rng(4).normal(size=rest.shape)
+    step = 1e-8
+
+    def at(k):
+        return evaluated(scene, positions + k * step * direction)
+
+    _, gradient, product = evaluated(scene, positions, direction=direction)
+    slope = (8 * (at(1)[0] - at(-1)[0]) - (at(2)[0] - at(-2)[0])) / (12 * step)
+    change = (8 * (at(1)[1] - at(-1)[1]) - (at(2)[1] - at(-2)[1])) / (12 * step)
+    assert abs(slope - np.sum(gradient * direction)) < 1e-6 * np.abs(gradient * direction).sum()
+    assert np.abs(change - product).max() < 1e-6 * np.abs(product).max()

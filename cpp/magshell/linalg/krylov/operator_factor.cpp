@@ -59,7 +59,7 @@ Count count_below(const Factor& positive, const OperatorFactor::Operator& produc
     VectorXd v = z;
     positive.solve(v);
     double length = std::sqrt(std::max(0.0, z.dot(v))), largest = 0.0;
-    Count count;
+    Count count{.settled = n == 0};
     for (int step = 1; step <= std::min<Index>(most, n) && !count.settled; ++step) {
         images.push_back(z / length);
         vectors.push_back(v / length);

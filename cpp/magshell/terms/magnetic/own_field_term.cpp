@@ -5,7 +5,6 @@
 
 #include "magshell/assembly/rough_hessian_operator.h"
 #include "magshell/core/errors.h"
-#include "magshell/terms/magnetic/solid_triangles.h"
 
 namespace magshell {
 namespace {
@@ -62,7 +61,7 @@ OwnFieldTerm::OwnFieldTerm(Sources sources, Index max_points, double accuracy, c
         thickness_.push_back(
             registry.values.add(sheet.owner(), "thickness", "m", sheet.n_faces(), 1, &sheet.faces()));
     }
-    for (const Solid* solid : solids_)
+    for (const auto& [solid, law] : solids_)
         of_solids_.push_back(registry.values.add(solid->owner, "remanent_magnetization", "A/m",
                                                  solid->n_elements(), 3, &solid->elements));
     for (const Magnet& magnet : magnets_) {
@@ -90,7 +89,7 @@ bool OwnFieldTerm::set_values(const Values& values) {
         }
     of_tetrahedra_.clear();
     for (std::size_t k = 0; k < solids_.size(); ++k)
-        for (Index t = 0; t < solids_[k]->n_elements(); ++t)
+        for (Index t = 0; t < solids_[k].solid->n_elements(); ++t)
             of_tetrahedra_.push_back(values.vector(of_solids_[k], t));
     field_.set(magnetizations_, thicknesses_, of_tetrahedra_);
     std::vector<OwnField::DipoleWeights> dipoles;
@@ -161,9 +160,9 @@ std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
         first = last;
     }
     first = 0;
-    for (const Solid* solid : solids_) {
-        const std::ptrdiff_t last = first + solid->n_elements();
-        add(OwnField({}, triangles_of({solid}), {}), {}, {},
+    for (const MagnetizedSolid& each : solids_) {
+        const std::ptrdiff_t last = first + each.solid->n_elements();
+        add(OwnField({}, triangles_of(std::vector{each}), {}), {}, {},
             {of_tetrahedra_.begin() + first, of_tetrahedra_.begin() + last});
         first = last;
     }
@@ -183,7 +182,7 @@ void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, c
         }
     std::size_t tetrahedron = 0;
     for (std::size_t k = 0; k < solids_.size(); ++k)
-        for (Index t = 0; t < solids_[k]->n_elements(); ++t)
+        for (Index t = 0; t < solids_[k].solid->n_elements(); ++t)
             out.values.segment<3>(of_solids_[k].at(t)) += factor * by.of_tetrahedra[tetrahedron++];
     for (std::size_t k = 0; k < magnets_.size(); ++k) {
         out.values.segment<3>(moment_[k].first) += factor * corners_[k].gradient(by.of_dipoles[k].moment);

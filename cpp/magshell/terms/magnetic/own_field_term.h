@@ -3,10 +3,10 @@
 #pragma once
 
 #include "magshell/body/nodes.h"
-#include "magshell/body/solid.h"
 #include "magshell/energy/own_field.h"
 #include "magshell/terms/magnetic/corner_weights.h"
 #include "magshell/terms/magnetic/sheet_triangles.h"
+#include "magshell/terms/magnetic/solid_triangles.h"
 #include "magshell/terms/operator_term.h"
 
 namespace magshell {
@@ -20,7 +20,7 @@ class OwnFieldTerm final : public OperatorTerm {
     };
     struct Sources {
         std::vector<SheetTriangles> sheets;
-        std::vector<const Solid*> solids;
+        std::vector<MagnetizedSolid> solids;
         std::vector<Magnet> magnets;
     };
 
@@ -57,7 +57,7 @@ class OwnFieldTerm final : public OperatorTerm {
     std::shared_ptr<const State> state_at(const double* q) const;
 
     const std::vector<SheetTriangles> sheets_;
-    const std::vector<const Solid*> solids_;
+    const std::vector<MagnetizedSolid> solids_;
     const std::vector<Magnet> magnets_;
     std::vector<CornerWeights> corners_;  // of the magnets
     const Index max_points_, n_dofs_;

@@ -43,10 +43,11 @@ struct Side {
 
 }  // namespace
 
-OwnField::Triangles triangles_of(const std::vector<const Solid*>& solids) {
+OwnField::Triangles triangles_of(const std::vector<MagnetizedSolid>& solids) {
     OwnField::Triangles out;
     std::vector<Side> sides;
-    for (const Solid* solid : solids) {
+    for (const auto& [solid, law] : solids) {
+        const Index first = static_cast<Index>(out.rotates.size());
         const std::vector<Corners> triangles = triangles_of_element(solid->quadratic());
         for (Index t = 0; t < solid->n_elements(); ++t) {
             const std::span<const Index> nodes = solid->nodes_of(t);
@@ -58,10 +59,10 @@ OwnField::Triangles triangles_of(const std::vector<const Solid*>& solids) {
                 }
                 side.key = side.nodes;
                 std::sort(side.key.begin(), side.key.end());
-                side.tetrahedron = out.n_tetrahedra + t;
+                side.tetrahedron = first + t;
             }
         }
-        out.n_tetrahedra += solid->n_elements();
+        out.rotates.insert(out.rotates.end(), solid->n_elements(), law == MagnetizationLaw::rotates);
     }
     std::stable_sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.key < b.key; });
     for (std::size_t k = 0; k < sides.size(); ++k) {

@@ -234,10 +234,6 @@ class Scene(PlotMixin):
         self._warned_of_jumps = False
         self._warned_of_units: set[str] = set()
         self._cores = CoreModels(self._new_model(), self._new_model)
-        if self.own_field is not None and self._model.reduce(self._model.rest_state()).size == 0:
-            raise ValueError(
-                "the supports hold all vertices, so that nothing moves in the own field: leave at least one free"
-            )
         self._value_layout = Layout(self._model.parameters)
         self._load_parameter_layout = Layout(self._model.load_parameters)
         self._values = Values(self)
