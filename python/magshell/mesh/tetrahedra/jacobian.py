@@ -29,7 +29,7 @@ def _basis(points: np.ndarray) -> np.ndarray:
 _FROM_VALUES = np.linalg.inv(_basis(_POINTS))
 
 
-def _gradients(points: np.ndarray) -> np.ndarray:
+def shape_gradients(points: np.ndarray) -> np.ndarray:
     """Return the derivatives of the ten shape functions at barycentric coordinates (n, 4), (n, 10, 3).
 
     They are with respect to the last three coordinates; the first is one minus their sum.
@@ -54,7 +54,7 @@ def _halves() -> np.ndarray:
 
 
 _PARTS = _halves()
-_AT_POINTS = _gradients(_POINTS)
+_AT_POINTS = shape_gradients(_POINTS)
 
 
 def straight_volumes(corner_positions: np.ndarray) -> np.ndarray:

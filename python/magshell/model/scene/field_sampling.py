@@ -26,6 +26,8 @@ from ..._runtime.warning_stacklevel import callers_level
 from ...errors import FieldSamplingWarning
 from ..shells.deformed_magnetization import deformed_magnetization, frames_of
 from ..solids.solid import Solid
+from .element_rules import FacePoints
+from .element_sampling import Sources, element_forces, has_elements
 from .magnetization import magnetized_bodies
 
 if TYPE_CHECKING:
@@ -44,36 +46,6 @@ _MOST_NAMED = 4  # faces in a warning
 _TOGETHER = 2048  # faces whose samples are in memory at the same time
 # The name in the core of the value of a face that is 1 where it samples finely.
 KEY = "field_sampling"
-
-
-class _Rule(NamedTuple):
-    """Points of a face: barycentric coordinates (n, 3), heights over the middle surface by the thickness, weights (n,)."""
-
-    at: np.ndarray
-    heights: np.ndarray
-    weights: np.ndarray
-
-
-def _fine() -> _Rule:
-    """Return the rule of faces that sample finely."""
-    rows = _core.fine_face_points()
-    return _Rule(rows[:, :3], rows[:, 3], rows[:, 4])
-
-
-def _finer() -> _Rule:
-    """Return the rule that shows the error of _fine(): Dunavant's of degree 4 in each quarter of a face, at three levels."""
-    a, b = 0.445948490915965, 0.091576213509771
-    inside = np.array([np.roll((each, each, 1.0 - 2.0 * each), turn) for each in (a, b) for turn in range(3)])
-    weights = np.repeat([0.223381589678011, 0.109951743655322], 3)
-    corners, middles = np.eye(3), 0.5 * (np.ones((3, 3)) - np.eye(3))
-    quarters = [(corners[k], middles[(k + 1) % 3], middles[(k + 2) % 3]) for k in range(3)] + [tuple(middles)]
-    at = np.concatenate([inside @ np.array(quarter) for quarter in quarters])
-    levels, of_levels = np.polynomial.legendre.leggauss(3)
-    return _Rule(
-        np.tile(at, (3, 1)),
-        np.repeat(0.5 * levels, len(at)),
-        np.outer(0.5 * of_levels, np.tile(0.25 * weights, 4)).ravel(),
-    )
 
 
 class _Faces(NamedTuple):
@@ -96,7 +68,7 @@ class _Faces(NamedTuple):
         """Return the moments in flux densities (n, n_points, 3) T, of the same shape, A m2."""
         return self.moments[:, None] + np.einsum("fij,fqj->fqi", self.response, flux)
 
-    def points(self, rule: _Rule) -> np.ndarray:
+    def points(self, rule: FacePoints) -> np.ndarray:
         """Return the points of a rule, (n, n_points, 3) m."""
         x0, x1, x2 = np.moveaxis(self.corners, 1, 0)
         across = np.cross(x1 - x0, x2 - x0)
@@ -123,7 +95,9 @@ class SamplingError(NamedTuple):
 
 
 def is_suspect(estimate: float) -> bool:
-    """Return whether the error has to be computed, by the core's estimate from the samples of the solve (NaN if unknown)."""
+    """Return whether the error of three-node faces has to be computed, by the core's estimate from the samples of the solve
+    (NaN if unknown).
+    """
     return not estimate <= _SUSPECT
 
 
@@ -147,6 +121,38 @@ def warn_of_sampling(found: Iterable[SamplingError], where: str) -> None:
             )
 
 
+def warn_of_elements(
+    values: Values, positions: np.ndarray, field_factor: float, flux_density: Any, where: str
+) -> None:
+    """Warn if the magnetic force on a six-node shell or a solid is off by more than 1 %, or if that cannot be told.
+
+    Arguments as for sampling_errors().
+    """
+    if not has_elements(values):
+        return
+    sources = _sources(values, positions, field_factor, flux_density)
+    if sources is None:
+        return
+    for each in element_forces(values, positions, sources):
+        off = each.taken - each.mean
+        known = np.isfinite(off).all(axis=1)
+        total = _size_of_forces(each.mean[known], each.couples[known], values.scene._bodies.extent)
+        error = float(np.linalg.norm(off[known].sum(axis=0))) / total if total > 0.0 else 0.0
+        if error > TRUSTED:
+            order = np.argsort(-np.linalg.norm(np.where(known[:, None], off, 0.0), axis=1), kind="stable")
+            _warn(
+                f"{where}: the magnetic force on {each.body!r} is off by about {error:.2%}, as its elements sample the "
+                f"field at few points, and it changes over them; most of that is of {_named(order, 'elements')}. "
+                "Take smaller elements there, or keep the body farther away"
+            )
+        if not known.all():
+            _warn(
+                f"{where}: {_named(np.flatnonzero(~known), 'elements')} of {each.body!r} reach to where a field has no "
+                "value, into a magnet or out of a grid, so that the error of the magnetic force on them cannot be "
+                "told. Keep the body farther away, or take a larger grid"
+            )
+
+
 def _advice(worst: SamplingError) -> str:
     order = np.argsort(-np.nan_to_num(worst.off), kind="stable")
     named = f"most of that is of {_named(order)}"
@@ -160,9 +166,9 @@ def _advice(worst: SamplingError) -> str:
     )
 
 
-def _named(faces: np.ndarray) -> str:
+def _named(faces: np.ndarray, what: str = "faces") -> str:
     more = ", ..." if len(faces) > _MOST_NAMED else ""
-    return f"faces {', '.join(map(str, faces[:_MOST_NAMED].tolist()))}{more}"
+    return f"{what} {', '.join(map(str, faces[:_MOST_NAMED].tolist()))}{more}"
 
 
 def _warn(text: str) -> None:
@@ -177,17 +183,11 @@ def sampling_errors(
     values: with the field sources as in this state. positions: (n_v, 3) m. field_factor: of the sources. flux_density:
     (3,) T of a uniform field, or None.
     """
-    fields = [
-        each._core
-        for each in map(values.current, values.scene.fields)
-        if not getattr(each, "_is_uniform", False)
-    ]
-    if not fields or field_factor == 0.0 or not np.isfinite(positions).all():
+    sources = _sources(values, positions, field_factor, flux_density)
+    if sources is None:
         return
-    uniform = np.zeros(3) if flux_density is None else np.asarray(flux_density, dtype=np.float64)
-    sources = _Sources(fields, [float(field_factor)] * len(fields), uniform)
     extent = values.scene._bodies.extent
-    fine, finer = _fine(), _finer()
+    fine, finer = FacePoints.fine(), FacePoints.finer()
     for faces in _magnetized_faces(values, positions):
         if not (faces.moments.any() or faces.response.any()):
             continue
@@ -203,11 +203,7 @@ def sampling_errors(
         couples = np.cross(faces.moments_in(flux[:, None])[:, 0], flux)
         off = taken - mean
         known = np.isfinite(off).all(axis=1)
-        total = max(
-            float(np.linalg.norm(mean[known].sum(axis=0))),
-            _CANCELLING * float(np.linalg.norm(mean[known], axis=1).sum()),
-            float(np.linalg.norm(couples[known], axis=1).sum()) / extent,
-        )
+        total = _size_of_forces(mean[known], couples[known], extent)
         if (total > 0.0 and np.isfinite(total)) or not known.all():
             total = total or 1.0  # without a force or a couple to compare with, no error is known
             error = float(np.linalg.norm(off[known].sum(axis=0))) / total
@@ -215,15 +211,31 @@ def sampling_errors(
             yield SamplingError(faces.body, faces.label, error, off_by, faces.fine)
 
 
-class _Sources(NamedTuple):
-    """The fields of the core that vary in space, their factors, and the uniform flux density (3,) T."""
+def _size_of_forces(forces: np.ndarray, couples: np.ndarray, extent: float) -> float:
+    """Return the force [N] to which an error refers, from forces (n, 3) N and couples (n, 3) N m on the parts of a body."""
+    return max(
+        float(np.linalg.norm(forces.sum(axis=0))),
+        _CANCELLING * float(np.linalg.norm(forces, axis=1).sum()),
+        float(np.linalg.norm(couples, axis=1).sum()) / extent,
+    )
 
-    fields: list[Any]
-    factors: list[float]
-    uniform: np.ndarray
+
+def _sources(values: Values, positions: np.ndarray, field_factor: float, flux_density: Any) -> Sources | None:
+    """Return the fields that vary in space, or None if there are none."""
+    fields = [
+        each for each in map(values.current, values.scene.fields) if not getattr(each, "_is_uniform", False)
+    ]
+    if not fields or field_factor == 0.0 or not np.isfinite(positions).all():
+        return None
+    return Sources(
+        [each._core for each in fields],
+        [float(field_factor)] * len(fields),
+        np.zeros(3) if flux_density is None else np.asarray(flux_density, dtype=np.float64),
+        [each._sphere_around_sources() for each in fields],
+    )
 
 
-def _mean_forces(sources: _Sources, faces: _Faces, rule: _Rule | None) -> tuple[np.ndarray, np.ndarray]:
+def _mean_forces(sources: Sources, faces: _Faces, rule: FacePoints | None) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean flux density B [T] and force [N] of faces by a rule; without one, at their barycenters."""
     points = faces.corners.mean(axis=1)[:, None] if rule is None else faces.points(rule)
     weights = np.ones(1) if rule is None else rule.weights

@@ -17,7 +17,7 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.fields.magnet_overlap import describe_magnet_overlap
-from ...model.scene.field_sampling import sampling_errors, warn_of_sampling
+from ...model.scene.field_sampling import sampling_errors, warn_of_elements, warn_of_sampling
 from ...model.scene.fine_faces import fine_faces
 from ...model.scene.replacements import requested
 from ...model.scene.reshaped import reshaped, turning_supports
@@ -259,13 +259,15 @@ def _warn_of_fields(result: Trajectory) -> None:
         return
     k = int(np.argmax(np.abs(result.energies.get("magnetic", np.zeros(len(result))))))
     flux_density = result.applied_flux_density
-    found = sampling_errors(
+    where = f"the motion, in recorded state {k}, at {result.times[k]:.6g} s"
+    state = (
         result._values_at(k),
         np.asarray(detached(result.positions[k]), dtype=np.float64),
         float(result._field_factors[k]),
         None if flux_density is None else np.reshape(detached(flux_density), (-1, 3))[k],
     )
-    warn_of_sampling(found, f"the motion, in recorded state {k}, at {result.times[k]:.6g} s")
+    warn_of_sampling(sampling_errors(*state), where)
+    warn_of_elements(*state, where)
 
 
 def _requested_tangents(motion_inputs: MotionInputs) -> Sequence[np.ndarray] | None:

@@ -25,7 +25,8 @@ from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import describe_strains
-from ...model.scene.field_sampling import is_suspect, sampling_errors, warn_of_sampling
+from ...model.scene.element_sampling import has_elements
+from ...model.scene.field_sampling import is_suspect, sampling_errors, warn_of_elements, warn_of_sampling
 from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
 from ...model.scene.reshaped import reshaped, turning_supports
 from ...model.scene.scene import Scene
@@ -440,6 +441,25 @@ def _warn_of_fields(path: EquilibriumPath) -> None:
             path._load_parameter("applied_flux_density")[k, 0],
         )
         warn_of_sampling(found, f"the path, at point {k}, parameter {path.parameters[k]:.4g}")
+    if has_elements(path._values_at(0)):
+        k = int(np.argmax(_magnetic_energies(path)))  # magnets are nearest there
+        warn_of_elements(
+            path._values_at(k),
+            path.positions[k],
+            float(path._load_parameter("field_factor")[k, 0]),
+            path._load_parameter("applied_flux_density")[k, 0],
+            f"the path, at point {k}, parameter {path.parameters[k]:.4g}",
+        )
+
+
+def _magnetic_energies(path: EquilibriumPath) -> np.ndarray:
+    """Return the magnitude of the energy in the applied field at each point [J]."""
+    energies = []
+    for k, (point, load_parameters) in enumerate(zip(path._points, path._load_parameters, strict=True)):
+        with path._values_at(k).in_core():
+            terms = path.scene._model.energies(point.state, load_parameters)
+        energies.append(abs(terms.get("magnetic", 0.0)))
+    return np.array(energies)
 
 
 def _bending_energies(scene: Scene, found, load_parameters) -> list[float]:

@@ -19,7 +19,13 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.contact.watched_obstacles import watched_obstacles
-from ...model.scene.field_sampling import SamplingError, is_suspect, sampling_errors, warn_of_sampling
+from ...model.scene.field_sampling import (
+    SamplingError,
+    is_suspect,
+    sampling_errors,
+    warn_of_elements,
+    warn_of_sampling,
+)
 from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces, with_fine_faces_and_errors
 from ...model.scene.replacements import requested
 from ...model.scene.reshaped import reshaped
@@ -211,6 +217,7 @@ def solve(
             if errors is None:
                 errors = sampling_errors(inputs.values, positions, field_factor, flux_density)
             warn_of_sampling(errors, "this equilibrium")
+        warn_of_elements(inputs.values, positions, field_factor, flux_density, "this equilibrium")
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Solution(result, found, inputs)
