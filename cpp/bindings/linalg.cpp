@@ -7,6 +7,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/given_away.h"
+#include "bindings/operator_part.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/build_info.h"
@@ -57,18 +58,34 @@ class SharedFactor {
         factor_ = analyze(std::move(pattern), options);
     }
 
-    FactorReport factorize(const Array& values, const Eigen::MatrixXd& columns, const VectorXd& stiffness) {
+    FactorReport factorize(const Array& values, const Eigen::MatrixXd& columns, const VectorXd& stiffness,
+                           const WeightedOperators& operators) {
         check_values(values);
+        for (const auto& [weight, each] : operators)
+            if (!each || each->size() != factor_->size())
+                throw InvalidInput("operators must be of vectors of shape (" +
+                                   std::to_string(factor_->size()) + ",)");
         const py::gil_scoped_release release;
         const std::unique_lock lock(mutex_);
         if (columns.cols() > 0 && (columns.rows() != factor_->size() || columns.cols() != stiffness.size()))
             throw InvalidInput("columns must have shape (n, k), with a stiffness each, (k,)");
         if (columns.cols() > 0 && !bordered_) {
+            if (operated_) throw InvalidInput("columns must be there from the first factorization on");
             std::unique_ptr<LowRankFactor> bordered = std::make_unique<LowRankFactor>(std::move(factor_));
             bordered_ = bordered.get();
             factor_ = std::move(bordered);
         }
         if (bordered_) bordered_->set_low_rank(columns, stiffness);
+        if (!operators.empty() && !operated_) {
+            std::unique_ptr<OperatorFactor> operated = std::make_unique<OperatorFactor>(std::move(factor_));
+            operated_ = operated.get();
+            factor_ = std::move(operated);
+        }
+        if (operated_) {
+            const OperatorFactor::Operator sum =
+                operators.empty() ? OperatorFactor::Operator() : sum_of(operators);
+            operated_->set_operator(sum, sum);
+        }
         std::copy_n(values.data(), values.size(), factor_->values().begin());
         return factor_->factorize();
     }
@@ -113,7 +130,8 @@ class SharedFactor {
 
     py::ssize_t entries_;
     std::unique_ptr<Factor> factor_;
-    LowRankFactor* bordered_ = nullptr;  // factor_, once it has a low-rank part
+    LowRankFactor* bordered_ = nullptr;   // factor_ or a part of it, once it has a low-rank part
+    OperatorFactor* operated_ = nullptr;  // factor_, once it has operators
     mutable std::shared_mutex mutex_;
 };
 
@@ -139,12 +157,22 @@ void register_linalg(py::module_& module) {
                       "about p digits")
         .def("__repr__", &describe);
 
+    py::class_<OperatorPart, std::shared_ptr<OperatorPart>>(
+        module, "OperatorPart",
+        "The part of a Hessian of the free unknowns that is known by its products only: that of the own "
+        "field.")
+        .def("product", &OperatorPart::product, py::arg("x"), py::call_guard<py::gil_scoped_release>(),
+             "The product with a vector of the free unknowns (n,).");
+
     py::class_<SharedFactor>(
         module, "Factor", "An analysed sparse symmetric pattern; factorize() it with values, then solve().")
         .def("factorize", &SharedFactor::factorize, py::arg("values"),
              py::arg("columns") = Eigen::MatrixXd(0, 0), py::arg("stiffness") = VectorXd(0),
+             py::arg("operators") = WeightedOperators(),
              "Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with "
-             "columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T.")
+             "columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T; and with operators "
+             "[(weight, OperatorPart)]: solves are iterative then, and equal negative eigenvalues count "
+             "once.")
         .def("solve", &SharedFactor::solve, py::arg("rhs"),
              "The solution for the right-hand side (n,) or (n, k).")
         .def("residual", &SharedFactor::residual, py::arg("values"), py::arg("solution"), py::arg("rhs"),

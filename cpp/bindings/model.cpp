@@ -7,6 +7,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/given_away.h"
+#include "bindings/operator_part.h"
 #include "bindings/scene_input.h"
 #include "bindings/strains.h"
 #include "magshell/assembly/rough_hessian_operator.h"
@@ -80,6 +81,36 @@ py::list term_energies(Model& model, const VectorXd& q, const Model::AngleBranch
     for (const auto& [name, value] : of_terms)
         energies.append(py::make_tuple(py::str(name.data(), name.size()), value));
     return energies;
+}
+
+// Returns the Hessian of the free dofs in three parts: the lower triangle as hessian() has it, (columns, stiffnesses) of low rank, and an
+// OperatorPart or None.
+py::tuple hessian_parts(const py::object& owner, const VectorXd& q, const LoadParameters& load_parameters) {
+    Model& model = owner.cast<Model&>();
+    LargeVector<double> values;
+    SparsePattern pattern;
+    Eigen::MatrixXd columns;
+    VectorXd stiffness;
+    OperatorFactor::Operator product;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        model.evaluate(q, load_parameters);
+        model.assemble(q, load_parameters, false);
+        model.require_symmetric();
+        model.reduce_matrix(values);
+        model.dof_map().add_curvature(model.residual().gradient, values);
+        pattern = *model.dof_map().pattern();
+        columns = model.low_rank().reduced(model.dof_map(), model.size());
+        stiffness = model.low_rank().stiffness();
+        product = model.operator_product(false);
+    }
+    const Index size = pattern.size;
+    const std::shared_ptr<OperatorPart> part =
+        product ? std::make_shared<OperatorPart>(owner, q, std::move(product)) : nullptr;
+    return py::make_tuple(py::make_tuple(size, given_away(std::move(pattern.column_starts)),
+                                         given_away(std::move(pattern.rows)), given_away(std::move(values))),
+                          py::make_tuple(columns, stiffness), part);
 }
 
 // Returns the lower triangle as (size, column starts, rows, values), of all degrees of freedom or of the free
@@ -428,6 +459,10 @@ void register_model(py::module_& module) {
             py::arg("q"), py::call_guard<py::gil_scoped_release>(),
             "How nodes of links and rigid parts move, at a state: evaluations begin with it.")
         .def("hessian", &hessian, py::arg("q"), py::arg("load_parameters"), py::arg("reduced") = true)
+        .def("hessian_parts", &hessian_parts, py::arg("q"), py::arg("load_parameters"),
+             "The Hessian of the free unknowns at a state: the lower triangle as hessian() has it, columns "
+             "and "
+             "stiffnesses as low_rank() has them, and the OperatorPart of the own field, or None.")
         .def(
             "small_deflection",
             [](Model& model, const VectorXd& q, const LoadParameters& unloaded,

@@ -30,6 +30,7 @@ __all__: list[str] = [
     "MotionResult",
     "NewtonOptions",
     "Obstacle",
+    "OperatorPart",
     "OtherBranch",
     "Outcome",
     "PathOptions",
@@ -122,6 +123,17 @@ class FactorReport:
     @property
     def succeeded(self) -> bool: ...
 
+class OperatorPart:
+    """
+    The part of a Hessian of the free unknowns that is known by its products only: that of the own field.
+    """
+    def product(
+        self, x: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        The product with a vector of the free unknowns (n,).
+        """
+
 class Factor:
     """
     An analysed sparse symmetric pattern; factorize() it with values, then solve().
@@ -131,9 +143,12 @@ class Factor:
         values: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
         columns: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
         stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] = ...,
+        operators: collections.abc.Sequence[
+            tuple[typing.SupportsFloat | typing.SupportsIndex, OperatorPart]
+        ] = [],
     ) -> FactorReport:
         """
-        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T.
+        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T; and with operators [(weight, OperatorPart)]: solves are iterative then, and equal negative eigenvalues count once.
         """
     def residual(
         self,
@@ -480,6 +495,14 @@ class Model:
         load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
         reduced: bool = True,
     ) -> tuple[typing.Any, ...]: ...
+    def hessian_parts(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> tuple[typing.Any, ...]:
+        """
+        The Hessian of the free unknowns at a state: the lower triangle as hessian() has it, columns and stiffnesses as low_rank() has them, and the OperatorPart of the own field, or None.
+        """
     def hessian_product(
         self,
         q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from adjoint_scenes import DEFAULTS, MESH, everything
+from gradient_kinds_own_field import stiff_pair, stiff_pair_magnetization
 from gradient_scenes import Kind
 from gradient_world import EXACT, FACTORS, REACH
 
@@ -210,7 +211,15 @@ def snapping_beam() -> Kind:
     return Kind(scene, inputs, solve=snap, fixed=EXACT, reach=reach, of_linear=True)
 
 
+def vibrating_with_own_field() -> Kind:
+    """Build two flaps that vibrate about their equilibrium in each other's field."""
+    scene = stiff_pair()
+    inputs = {"remanent_magnetization": stiff_pair_magnetization(scene)}
+    return Kind(scene, inputs, solve=frequencies, fixed=EXACT, reach=REACH)
+
+
 LINEAR_MAKERS = {
+    "flaps with their own field that vibrate": vibrating_with_own_field,
     "a sheet that vibrates about an equilibrium": vibrating_sheet,
     "a solid that vibrates about an equilibrium": vibrating_solid,
     "a sheet that vibrates about its rest shape": vibrating_at_rest,

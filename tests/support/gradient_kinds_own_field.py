@@ -100,3 +100,22 @@ def bodies_with_own_field() -> Kind:
     )
     inputs = {"applied_flux_density": np.array([1e-3, -2e-3, 3e-3])}
     return Kind(scene, inputs, fixed=EXACT, reach=REACH)
+
+
+def stiff_pair() -> ms.Scene:
+    """Build two clamped flaps above each other, of few degrees of freedom, so that eigenvalue problems take little time."""
+    mesh = ms.meshes.rectangle(0.02, 0.006, cells=(3, 1))
+    meshes = [mesh, mesh.transformed(translation=(1e-3, 5e-4, 4e-3))]
+    flaps = [
+        ms.Shell(each, thickness=4e-4, young_modulus=modulus, poisson_ratio=0.3, mass_density=2e3)
+        for each, modulus in zip(meshes, (4e8, 5e8), strict=True)
+    ]
+    supports = [
+        ms.Clamp(each.edges_at(x=each.rest_positions[:, 0].min()), body=flap)
+        for each, flap in zip(meshes, flaps, strict=True)
+    ]
+    return ms.Scene(flaps, supports=supports, own_field=ms.OwnField())
+
+
+def stiff_pair_magnetization(scene) -> np.ndarray:
+    return 4e4 * np.random.default_rng(4).uniform(0.5, 1.5, (scene.mesh.n_faces, 3)) * (1.0, 0.5, 1.0)

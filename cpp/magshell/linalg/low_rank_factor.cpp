@@ -100,7 +100,10 @@ void LowRankFactor::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {
 }
 
 std::unique_ptr<Factor> LowRankFactor::sibling() const {
-    return std::make_unique<LowRankFactor>(sparse_->sibling());
+    std::unique_ptr<LowRankFactor> other = std::make_unique<LowRankFactor>(sparse_->sibling());
+    other->columns_ = columns_;
+    other->signs_ = signs_;
+    return other;
 }
 
 double LowRankFactor::flops() const {

@@ -27,6 +27,7 @@ class LowRankFactor final : public Factor {
     FactorReport factorize() override;
     VectorXd image(const VectorXd& x) const override;
     void solve(Eigen::Ref<Eigen::MatrixXd> rhs) const override;
+    /// The other one has the same low-rank part until its own is set.
     std::unique_ptr<Factor> sibling() const override;
 
     std::string name() const override { return sparse_->name(); }

@@ -292,23 +292,21 @@ void Model::reduce_matrix(Factor& factor) {
         static_cast<LowRankFactor&>(factor).set_low_rank(low_rank_.reduced(dof_map_, size()),
                                                          low_rank_.stiffness());
     if (terms_.operators.empty()) return;
-    const auto product_of = [&](bool rough) {
-        OperatorFactor::Operator product;
-        if (!operators_.empty())
-            product = [this, rough, operators = operators_](const VectorXd& x) {
-                const VectorXd full = dof_map_.expand(x);
-                VectorXd image = VectorXd::Zero(full.size());
-                for (const std::shared_ptr<const HessianOperator>& each : operators)
-                    if (const auto* quick = dynamic_cast<const RoughHessianOperator*>(each.get());
-                        quick && rough)
-                        quick->add_rough_product(full, image);
-                    else
-                        each->add_product(full, image);
-                return dof_map_.vector(image);
-            };
-        return product;
+    static_cast<OperatorFactor&>(factor).set_operator(operator_product(false), operator_product(true));
+}
+
+std::function<VectorXd(const VectorXd&)> Model::operator_product(bool rough) const {
+    if (operators_.empty()) return {};
+    return [this, rough, operators = operators_](const VectorXd& x) {
+        const VectorXd full = dof_map_.expand(x);
+        VectorXd image = VectorXd::Zero(full.size());
+        for (const std::shared_ptr<const HessianOperator>& each : operators)
+            if (const auto* quick = dynamic_cast<const RoughHessianOperator*>(each.get()); quick && rough)
+                quick->add_rough_product(full, image);
+            else
+                each->add_product(full, image);
+        return dof_map_.vector(image);
     };
-    static_cast<OperatorFactor&>(factor).set_operator(product_of(false), product_of(true));
 }
 
 // Finds the columns that each element block clears before it assembles: those of its own nodes that no earlier block has. The last entry has
@@ -416,9 +414,8 @@ void Model::require_sparse() const {
     throw InvalidInput(
         "the own field couples all magnetized vertices, so the stiffness is not a sparse matrix. Equilibria, "
         "paths, motions by "
-        "time steps and their gradients can be computed with own_field; vibrations, buckling loads, small "
-        "deflections and "
-        "Hessians as matrices cannot: leave own_field out of the scene for these");
+        "time steps, vibrations, buckling loads, linear responses and their gradients can be computed with "
+        "own_field; Hessians as matrices cannot: leave own_field out of the scene for these");
 }
 
 VectorXd Model::term_gradient(std::string_view name, const VectorXd& q,

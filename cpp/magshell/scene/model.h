@@ -51,6 +51,9 @@ class Model {
     const LowRank& low_rank() const { return low_rank_; }
     /// The parts of the Hessian assembled last that are known by their products only; matrix() does not contain them.
     const std::vector<std::shared_ptr<const HessianOperator>>& operators() const { return operators_; }
+    /// Returns the product of operators() with a vector of the free dofs, linearized as at the call; empty if there are none. rough: nearly
+    /// that product in less time. The model must outlive it.
+    std::function<VectorXd(const VectorXd&)> operator_product(bool rough) const;
     SystemMatrix* contact_matrix();
     const Residual& residual() const { return residual_; }
     Index size() const { return nodes().n_dofs(); }

@@ -10,7 +10,7 @@ import scipy
 from ... import _core
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ...model.solids.solid import Solid
-from ..adjoint.factorized import Factorized
+from ..adjoint.factorized import Factorized, StiffnessParts
 
 if TYPE_CHECKING:
     from .enriched import FinerSolution
@@ -87,7 +87,8 @@ def _relaxed(solution: FinerSolution, at_coarse: np.ndarray) -> np.ndarray:
     numbers = np.cumsum(free) - 1
     counts = np.bincount(numbers[columns[inner]], minlength=free.sum())
     starts = np.concatenate([[0], np.cumsum(counts)])
-    factor = Factorized(len(counts), starts, numbers[rows[inner]], entries[inner], model.free_points[free])
+    triangle = (len(counts), starts, numbers[rows[inner]], entries[inner])
+    factor = Factorized(StiffnessParts(triangle), model.free_points[free])
     motion[free] = factor.solve(-pulled[free])
     return model.expand(motion)
 

@@ -52,13 +52,15 @@ class CriticalSystem:
         self.line: Line = line
         self.parameter: float = parameter
         self._model = residual.inputs.scene._model
-        (size, starts, rows, numbers), low_rank = residual.hessian()
+        parts = residual.hessian()
+        size, starts, rows, numbers = parts.triangle
         diagonal = starts[:-1]
         guess, numbers = self._model.reduce(mode), numbers.copy()
         self.pinned: int = int(np.argmax(guess**2 * np.abs(numbers[diagonal])))
         added = np.abs(numbers[diagonal][self.pinned])
         numbers[diagonal[self.pinned]] += added
-        self._factor = Factorized(size, starts, rows, numbers, self._model.free_points, low_rank)
+        pinned = parts._replace(triangle=(size, starts, rows, numbers))
+        self._factor = Factorized(pinned, self._model.free_points)
         unit = np.zeros(size)
         unit[self.pinned] = 1.0
         self.response: np.ndarray = self._factor.solve(unit)

@@ -161,6 +161,5 @@ def through_equilibrium(residual: Residual, derivatives: Derivatives) -> Derivat
 def multiplier_of(residual: Residual, by_state: np.ndarray) -> np.ndarray:
     """Return the solution w of K w = -by_state for the free unknowns, of all unknowns, with the stiffness K there."""
     model = residual.inputs.scene._model
-    triangle, low_rank = residual.hessian()
-    stiffness = Factorized(*triangle, model.free_points, low_rank)
+    stiffness = Factorized(residual.hessian(), model.free_points)
     return model.expand(stiffness.solve(-model.reduce(by_state)))

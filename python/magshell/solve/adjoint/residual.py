@@ -19,6 +19,7 @@ from ...errors import NoGradient
 from ...model.scene.reshaped import REST
 from ...model.scene.values import Gradient
 from .differences import ROUNDING, directional_derivative
+from .factorized import StiffnessParts, stiffness_parts
 
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Inputs
@@ -96,18 +97,13 @@ class Residual:
         self._prepare()
         return self._model.gradient(self.state, self.load_parameters)
 
-    def hessian(self) -> tuple[tuple[int, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, ...]]:
-        """Return the lower triangle of H for the free unknowns, and its low-rank part, () if there is none.
-
-        Raises NoGradient if H is not symmetric.
-        """
+    def hessian(self) -> StiffnessParts:
+        """Return the parts of H for the free unknowns. Raises NoGradient if H is not symmetric."""
         self._prepare()
         try:
-            triangle = self._model.hessian(self.state, self.load_parameters)
+            return stiffness_parts(self._model, self.state, self.load_parameters)
         except ValueError as error:
             raise NoGradient(f"no gradient here: {error}") from error
-        columns, stiffnesses = self._model.low_rank()
-        return triangle, ((columns, stiffnesses) if np.any(stiffnesses) else ())
 
     def product(self, motion: np.ndarray) -> np.ndarray:
         """Return H times a motion of all unknowns. Raises NoGradient if H is not symmetric."""

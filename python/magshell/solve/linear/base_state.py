@@ -22,23 +22,13 @@ def idle_inputs(
     **factors: Any,
 ) -> Inputs:
     """Return inputs without loads and field unless they are given; shells and skins without magnetization get zero."""
-    _refuse_own_field(scene)
-    if scene.fields:
+    if scene.is_magnetic:
         nothing = {"remanent_magnetization": np.zeros(3)}
         magnetic = (*scene._bodies.shells, *scene._bodies.skins)
         replaced = {**replaced, **{each: {**nothing, **replaced.get(each, {})} for each in magnetic}}
     if flux_density is None and scene.has_uniform_field and not factors:
         flux_density = np.zeros(3)
     return Inputs(scene, None, flux_density, replaced=replaced, differentiable=differentiable, **factors)
-
-
-def _refuse_own_field(scene: Scene) -> None:
-    """Raise ValueError for a scene with an OwnField, whose stiffness is not a sparse matrix."""
-    if scene.own_field is not None:
-        raise ValueError(
-            "vibrations, buckling loads and linear responses do not support own_field, which couples all vertices. "
-            "Equilibria, paths and motions by time steps can be computed with own_field; or leave it out of the scene"
-        )
 
 
 def inputs_about(
@@ -80,9 +70,7 @@ def linear_inputs(scene: Scene, equilibrium: Equilibrium | None, arguments: dict
     Raises ValueError if they do not fit the scene or the equilibrium.
     """
     if equilibrium is None:
-        inputs = plain_inputs(scene, differentiable=True, **arguments)
-        _refuse_own_field(scene)
-        return inputs
+        return plain_inputs(scene, differentiable=True, **arguments)
     inputs = inputs_about(scene, equilibrium, differentiable=True, **arguments)
     check_change(equilibrium, inputs)
     return inputs

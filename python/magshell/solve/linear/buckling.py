@@ -18,8 +18,10 @@ from ...errors import NotConverged
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ..adjoint.buckling import BucklingAdjoint
+from ..adjoint.factorized import StiffnessParts, stiffness_parts
 from ..statics.equilibrium import Equilibrium
 from .base_state import StiffnessAbout, leaves_of, linear_inputs, residual_of
+from .buckling_pencil import BucklingPencil
 from .mode_shapes import mode_shapes
 from .rest import RestStiffness, pulling_parts, refuse_springs
 from .stiffness import Stiffness
@@ -87,6 +89,9 @@ def linear_buckling(
     limit of small displacements before buckling: columns, plates loaded in their plane, closed shells. A shallow arch, which
     softens before it buckles, needs ms.follow_path. The stiffness of a field is included.
 
+    With own_field the magnetic field of the bodies themselves is a load like others: at rest the factors multiply it with
+    them, and about an equilibrium it is a part of K.
+
     Forces on a susceptible shell are quadratic in the field: in a scene with one the factors multiply the field, u and dK
     are by the square of the factor, and nothing but the field on such shells may load the scene.
 
@@ -106,10 +111,11 @@ def linear_buckling(
     and bodies in contact, since a contact bears in one direction only, so that a mode and its opposite have different
     factors. ms.follow_path follows opening and closing contacts.
 
-    Factors are differentiable but for those of susceptible shells, by perturbation of first order: by values and load
-    parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the change of the
-    equilibrium. A gradient costs two factorizations and some hundreds of evaluations of the stiffness for each factor asked
-    for. Factors that equal the next one to 1e-6 have none, nor those of loads with which supports move: NoGradient says so.
+    Factors are differentiable but for those of susceptible shells and with own_field, by perturbation of first order: by
+    values and load parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the
+    change of the equilibrium. A gradient costs two factorizations and some hundreds of evaluations of the stiffness for
+    each factor asked for. Factors that equal the next one to 1e-6 have none, nor those of loads with which supports move:
+    NoGradient says so.
     Modes are arrays.
 
     Raises ValueError on bad input, about an equilibrium that is not stable or with its own load parameters; in a scene with
@@ -160,6 +166,8 @@ def linear_buckling(
         if quadratic:
             _refuse_odd_loads(scene, stiffness, inputs)
         change = _stiffness_change(scene, stiffness, response, displacement, inputs, quadratic)
+        if (change.operators or stiffness.parts.operators) and change.fits_dense:
+            stiffness, change = stiffness.dense(), change.dense()
     leaves = leaves_of(inputs, equilibrium)
     asked = modes + bool(leaves and modes + 1 < model.free_size)  # whether the last one is simple
     factors, vectors = _lowest(stiffness, change, asked, _LARGEST_DISPLACEMENT * _size(scene), displacement)
@@ -201,6 +209,9 @@ def _differentiable(
     refusal = ""
     if inputs.scene.has_susceptible_shells:
         refusal = "no gradient of buckling factors with a susceptibility"
+    if inputs.scene.own_field is not None:
+        # It has fourth derivatives of the energy, which jump where near pairs of sources become far ones.
+        refusal = "no gradient of buckling factors with own_field"
     moves = rate.any() and (further.any() or any(leaf.name == "support_factor" for leaf, _ in leaves))
     adjoint = BucklingAdjoint(
         here,
@@ -251,8 +262,8 @@ def _stiffness_change(
     displacement: float,
     inputs: Inputs,
     quadratic: bool,
-) -> np.ndarray:
-    """Return the nonzeros of dK, in the pattern of K, for load parameters that go from those of K to those of the inputs.
+) -> StiffnessParts:
+    """Return the parts of dK, in the pattern of K, for load parameters that go from those of K to those of the inputs.
 
     quadratic: forces and stiffness are proportional to the square of the load parameters; dK is by that square.
     """
@@ -262,17 +273,27 @@ def _stiffness_change(
     moves = displacement > _ROUND_OFF * length
     step = _PRE_LOAD * length / displacement if moves else 1.0
 
-    def values(t: float, of_load_parameters: float) -> np.ndarray:
+    def parts(t: float, of_load_parameters: float) -> StiffnessParts:
         load_parameters = (
             1.0 - of_load_parameters
         ) * stiffness.load_parameters + of_load_parameters * inputs.load_parameters
-        return scene._model.hessian(stiffness.state + t * response, load_parameters)[3]
+        return stiffness_parts(scene._model, stiffness.state + t * response, load_parameters)
 
+    def values(t: float, of_load_parameters: float) -> np.ndarray:
+        return parts(t, of_load_parameters).triangle[3]
+
+    operators: tuple[Any, ...] = ()
     if quadratic:
         change = (values(step, 0.0) - values(-step, 0.0)) / (2.0 * step) + values(0.0, 1.0) - values(0.0, 0.0)
     else:
-        change = (values(step, step) - values(-step, -step)) / (2.0 * step)
-    if not change.any():
+        ahead, behind = parts(step, step), parts(-step, -step)
+        change = (ahead.triangle[3] - behind.triangle[3]) / (2.0 * step)
+        operators = tuple(
+            (way * weight / (2.0 * step), operator)
+            for way, side in ((1.0, ahead), (-1.0, behind))
+            for weight, operator in side.operators
+        )
+    if not change.any() and not operators:
         raise ValueError(
             "the load parameters neither load the scene nor change its stiffness: nothing buckles"
         )
@@ -281,36 +302,31 @@ def _stiffness_change(
         raise ValueError(
             f"the load parameters change the stiffness by {largest:g} N/m, beyond what numbers hold: are their units right?"
         )
-    return change
+    return StiffnessParts((*stiffness.parts.triangle[:3], change), (), operators)
 
 
 def _lowest(
-    stiffness: Stiffness, change: np.ndarray, count: int, max_displacement: float, displacement: float
+    stiffness: Stiffness, change: StiffnessParts, count: int, max_displacement: float, displacement: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the positive factors (k,), ascending, and their modes (n, k), k <= count.
 
     max_displacement: m, before buckling; factors that would need more are left out.
     """
-    # -dK v = (1/lambda) K v, with K positive definite: the smallest positive lambda are the largest
-    # eigenvalues.
-    negative_change = -stiffness.with_values(change)
-    size = negative_change.shape[0]
-    inverse = scipy.sparse.linalg.LinearOperator((size, size), matvec=stiffness.solve, dtype=np.float64)
-    start = np.random.default_rng(0).standard_normal(size)  # one that no symmetry is orthogonal to
-    pencil = {"A": negative_change, "M": stiffness.matrix, "Minv": inverse, "v0": start}
+    pencil = BucklingPencil(stiffness, change)
     try:
-        extreme = abs(scipy.sparse.linalg.eigsh(k=1, which="LM", return_eigenvectors=False, **pencil)[0])
         # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and
         # lambda. The search ends where the theory does: factors beyond belong to strains of order one, are closely
         # spaced and mean nothing.
-        largest = min(1e3 / extreme, max_displacement / displacement if displacement > 0.0 else np.inf)
-        available = stiffness.negative_directions(largest * change)
+        of_extreme = 1e3 / pencil.extreme()
+        largest = min(of_extreme, max_displacement / displacement if displacement > 0.0 else np.inf)
+        available = stiffness.negative_directions(change, largest)
         if available == 0:
             raise ValueError(
                 "nothing buckles under these load parameters, as far as linear theory reaches; under reversed ones it may"
             )
-        inverses, vectors = scipy.sparse.linalg.eigsh(k=min(count, available), which="LA", **pencil)
+        factors, modes = pencil.lowest(min(count, available))
+        if change.operators or stiffness.parts.operators:  # equal negative directions counted once
+            factors, modes = pencil.with_missing(factors, modes, count, largest)
     except scipy.sparse.linalg.ArpackError as error:
         raise NotConverged(f"the buckling modes did not converge: {error}. Ask for fewer modes.") from error
-    order = np.argsort(-inverses)
-    return 1.0 / inverses[order], vectors[:, order]
+    return factors, modes

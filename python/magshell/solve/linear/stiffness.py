@@ -10,7 +10,14 @@ import scipy
 
 from ... import _core
 from ...model.scene.scene import Scene
-from ..adjoint.factorized import Factorized, analyzed, times_low_rank
+from ..adjoint.factorized import (
+    Factorized,
+    StiffnessParts,
+    analyzed,
+    factorize,
+    stiffness_parts,
+    times_low_rank,
+)
 
 
 class IndefiniteStiffness(ValueError):
@@ -23,18 +30,9 @@ class _Factorized(Factorized):
     where: the state in words, for that error.
     """
 
-    def __init__(
-        self,
-        size: int,
-        starts: np.ndarray,
-        rows: np.ndarray,
-        values: np.ndarray,
-        points: np.ndarray,
-        where: str,
-        low_rank: tuple[np.ndarray, ...] = (),
-    ):
-        super().__init__(size, starts, rows, values, points, low_rank)
-        refuse_indefinite(self.report, size, where)
+    def __init__(self, parts: StiffnessParts, points: np.ndarray, where: str):
+        super().__init__(parts, points)
+        refuse_indefinite(self.report, parts.triangle[0], where)
 
 
 def refuse_indefinite(report: _core.FactorReport, size: int, where: str) -> None:
@@ -67,17 +65,10 @@ class Stiffness:
         """The model of the core that this thread uses."""
         return self._scene._model
 
-    @property
-    def _triangle(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-        """The size, column starts, rows and nonzeros of the lower triangle."""
-        return self._assembled[0]
-
     @functools.cached_property
-    def _assembled(self) -> tuple[tuple[int, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, ...]]:
-        """The lower triangle and the low-rank part, both from one evaluation."""
-        triangle = self._model.hessian(self.state, self.load_parameters)
-        columns, stiffnesses = self._model.low_rank()
-        return triangle, ((columns, stiffnesses) if np.any(stiffnesses) else ())
+    def parts(self) -> StiffnessParts:
+        """The sparse matrix K, its low-rank part and its operators, from one evaluation."""
+        return stiffness_parts(self._model, self.state, self.load_parameters)
 
     @functools.cached_property
     def gradient(self) -> np.ndarray:
@@ -86,17 +77,32 @@ class Stiffness:
 
     @property
     def matrix(self) -> scipy.sparse.csc_array:
-        """The sparse matrix K without its low-rank part, (n, n)."""
-        return symmetric(*self._triangle)
+        """The sparse matrix K without its low-rank part and its operators, (n, n)."""
+        return symmetric(*self.parts.triangle)
 
     def with_values(self, values: np.ndarray) -> scipy.sparse.csc_array:
         """Return the symmetric matrix (n, n) whose lower triangle has the pattern of K and these nonzeros."""
-        return symmetric(*self._triangle[:3], values)
+        return symmetric(*self.parts.triangle[:3], values)
 
-    def negative_directions(self, change: np.ndarray) -> int:
-        """Count the negative eigenvalues of K plus a change of its nonzeros, by another factorization."""
-        *pattern, values = self._triangle
-        return analyzed(*pattern, self._model.free_points).factorize(values + change).negative_pivots
+    def negative_directions(self, change: StiffnessParts, factor: float) -> int:
+        """Count the negative eigenvalues of K plus a multiple of a change, by another factorization. With operators equal
+        ones count once.
+        """
+        *pattern, values = self.parts.triangle
+        operators = (
+            *self.parts.operators,
+            *((factor * weight, operator) for weight, operator in change.operators),
+        )
+        moved = self.parts._replace(
+            triangle=(*pattern, values + factor * change.triangle[3]), operators=operators
+        )
+        return factorize(analyzed(*pattern, self._model.free_points), moved).negative_pivots
+
+    def dense(self) -> Stiffness:
+        """Return the same, not factorized, with a matrix of full pattern, which contains the operators."""
+        same = Stiffness(self._scene, self.state, self.load_parameters, self._where)
+        vars(same)["parts"] = self.parts.dense()
+        return same
 
     @property
     def factorized(self) -> bool:
@@ -114,8 +120,7 @@ class Stiffness:
     def _factor(self) -> _Factorized:
         with self._factorizing:
             if self._whole is None:
-                triangle, low_rank = self._assembled
-                self._whole = _Factorized(*triangle, self._model.free_points, self._where, low_rank)
+                self._whole = _Factorized(self.parts, self._model.free_points, self._where)
             return self._whole
 
     def answer(self, forces: np.ndarray, moved: np.ndarray) -> np.ndarray:
@@ -127,6 +132,8 @@ class Stiffness:
 
     def _pull(self, moved: np.ndarray) -> np.ndarray:
         """Return K times a motion of all degrees of freedom."""
+        if self.parts.operators:
+            return self._model.hessian_product(self.state, self.load_parameters, moved)
         pattern = self._model.hessian(self.state, self.load_parameters, reduced=False)
         return symmetric(*pattern) @ moved + times_low_rank(self._model.low_rank(reduced=False), moved)
 

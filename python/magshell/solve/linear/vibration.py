@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from ... import _core
 from ..._input.tensors import detached, dtype_like, is_tensor, like
 from ..._runtime.frozen import immutable
 from ..._runtime.solver_entry_point import solve_entry
-from ...errors import NotConverged
 from ...model.scene.replacements import requested
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
@@ -22,12 +20,14 @@ from ...model.shells.shell import Shell
 from ...model.solids.solid import Solid
 from ...model.supports.displacement_ties import DisplacementTie
 from ..adjoint.eigenvalue import FrequencyAdjoint
+from ..adjoint.factorized import stiffness_parts
 from ..adjoint.residual import Residual
 from ..statics.equilibrium import Equilibrium
 from .base_state import idle_inputs, inputs_about, set_state
 from .mode_shapes import mode_shapes
 from .rest import refuse_what_acts
 from .stiffness import symmetric
+from .vibration_pencil import VibrationPencil
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed
@@ -95,15 +95,7 @@ def nonzeros_in_pattern(matrix: scipy.sparse.csc_array, starts: np.ndarray, rows
     return np.where(hit, lower.data[order][found], 0.0)
 
 
-_ROUND_OFF_SHARE = (
-    64.0 * np.finfo(float).eps
-)  # of the fastest vibration's square: below, a square is round-off
 MASSES = ("lumped", "consistent")
-_SHIFT_GROWTH = 8.0
-_ATTEMPTS = 3  # each searches a larger space
-_TOLD_APART = (
-    1e-6  # squares that differ by less, relative to their distance from the shift, are not told apart
-)
 
 
 @immutable
@@ -166,7 +158,7 @@ def vibration_modes(
     does not count.
 
     equilibrium: of this scene, with the load parameters and values it was found for; one that is not stable has modes that
-        grow. By default the rest shape without loads and fields.
+        grow. By default the rest shape without loads and fields, the own field of the bodies included.
     values: as in ms.equilibrium, where there is no equilibrium, which has its own.
     count: how many modes.
     mass: "lumped" to the vertices, as motions have it: frequencies are off by the square of the size of the elements, 3 %
@@ -204,19 +196,22 @@ def vibration_modes(
     with inputs.in_core():
         if equilibrium is None:
             refuse_what_acts(inputs)
-            stiffness = model.hessian(model.rest_state(), scene._load_parameter_layout.zeros())
+            stiffness = stiffness_parts(model, model.rest_state(), scene._load_parameter_layout.zeros())
         else:
             set_state(equilibrium)
-            stiffness = model.hessian(equilibrium._state, equilibrium._load_parameters)
-        low_rank = model.low_rank()
+            stiffness = stiffness_parts(model, equilibrium._state, equilibrium._load_parameters)
         inertia = None
         if scene.rigid_parts:
             masses = model.free_weights(inputs.values.masses)  # as the parts are turned there
             inertia = model.free_weight_values(inputs.values.masses)
+        if stiffness.operators and stiffness.fits_dense:
+            pattern, stiffness = stiffness.triangle[:3], stiffness.dense()
+            if inertia is not None:
+                inertia = nonzeros_in_pattern(symmetric(*pattern, inertia), *stiffness.triangle[1:3])
     slow = min(map(_slow_square, inputs.values.deformable), default=1.0)
     if consistent is not None:
-        inertia = nonzeros_in_pattern(consistent, *stiffness[1:3])
-    pencil = _Pencil(stiffness, low_rank, model.free_points, masses, slow, inertia, consistent)
+        inertia = nonzeros_in_pattern(consistent, *stiffness.triangle[1:3])
+    pencil = VibrationPencil(stiffness, model.free_points, masses, slow, inertia, consistent)
     next_too = bool(inputs.leaves) and count + 1 < np.count_nonzero(masses)  # whether the last one is simple
     squares, vectors = pencil.lowest(int(count) + next_too)
     modes, edge_rotations = mode_shapes(model, vectors[:, : int(count)])
@@ -227,7 +222,7 @@ def vibration_modes(
         ),
         modes=modes,
         edge_rotations=edge_rotations,
-        unstable=pencil.growing(),
+        unstable=pencil.growing(squares),
         factorizations=pencil.factorizations,
         wall_time=time.perf_counter() - began,
     )
@@ -265,150 +260,6 @@ def _differentiable(
         consistent=consistent,
     )
     return solved(adjoint, (kept.copy(),), dtype_like(*inputs.given), inputs.tensors)[0]
-
-
-class _Pencil:
-    """K and M, and a factorization of K - shift M with the shift below every square of a frequency.
-
-    stiffness: (n, column starts, rows, nonzeros), the lower triangle of K. low_rank: columns (n, k) and their stiffnesses,
-    the rest of K. points: (n, 3) m, where the degrees of freedom are.
-    masses: (n,), the diagonal of M, zero for edge rotations. inertia: M at the nonzeros of K, if it is not diagonal.
-    consistent: M (n, n), if it is the consistent matrix, of which no root is computed.
-    slow_square: 1/s2, estimate of the lowest square of a sheet that is held.
-    """
-
-    def __init__(
-        self,
-        stiffness: tuple[Any, ...],
-        low_rank: tuple[Any, ...],
-        points: np.ndarray,
-        masses: np.ndarray,
-        slow_square: float,
-        inertia: np.ndarray | None = None,
-        consistent=None,
-    ):
-        *pattern, self._values = stiffness
-        self._low_rank = low_rank
-        self._diagonal = pattern[1][:-1]
-        self._masses = masses
-        self._moving = np.flatnonzero(masses)
-        self._inertia = inertia
-        self._consistent = consistent
-        if consistent is None:
-            self._root = (
-                _root(masses) if inertia is None else _coupled_root(symmetric(*pattern, inertia), masses)
-            )
-        self._factor = _core.analyze(*pattern, points=points)
-        self.factorizations = 0
-        stiffest = self._values[self._diagonal][self._moving] / masses[self._moving]
-        self._lost = _ROUND_OFF_SHARE * stiffest.max()
-        # Below zero, because nothing may resist a rigid motion; and further, the faster something grows.
-        self._shift = -max(slow_square, 16.0 * self._lost)
-        while self._squares_below(self._shift):
-            self._shift *= _SHIFT_GROWTH
-            if self._shift < -16.0 * stiffest.max():
-                raise NotConverged(
-                    "the edge rotations are not stable by themselves, so there are no frequencies"
-                )
-
-    def growing(self) -> int:
-        """Count the negative squares, which are modes that grow."""
-        return self._squares_below(-self._lost)
-
-    def lowest(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the lowest squares (k,), ascending, and their modes of all free degrees of freedom (n, k)."""
-        for attempt in range(_ATTEMPTS):
-            squares, modes = self._search(count, seed=attempt, space=(2 * count + 20) << attempt)
-            # A search may miss one of several equal ones. By Sylvester's law K - s M has as many negative pivots as
-            # there are squares below s.
-            below = squares[-1] - max(_TOLD_APART * (squares[-1] - self._shift), 2.0 * self._lost)
-            if self._squares_below(below) == np.count_nonzero(squares < below):
-                squares[np.abs(squares) <= self._lost] = 0.0
-                return squares, modes
-        raise NotConverged(f"some of the {count} slowest modes were not found. Ask for more, or for fewer.")
-
-    def _search(self, count: int, seed: int, space: int) -> tuple[np.ndarray, np.ndarray]:
-        # With M = L L^T, y = L^T x and the edge rotations at rest: L^T (K - shift M)^-1 L y = y / (w^2 - shift).
-        self._factorize(self._shift)
-        if self._consistent is not None:
-            return self._search_generalized(count, seed, space)
-        times_root, times_transposed = self._root
-
-        def moved_by(y: np.ndarray) -> np.ndarray:
-            forces = np.zeros(len(self._masses))
-            forces[self._moving] = y.ravel()
-            return self._factor.solve(times_root(forces))
-
-        size = len(self._moving)
-        inverse = scipy.sparse.linalg.LinearOperator(
-            (size, size), matvec=lambda y: times_transposed(moved_by(y))[self._moving], dtype=np.float64
-        )
-        start = np.random.default_rng(seed).standard_normal(size)  # one that no symmetry is orthogonal to
-        try:
-            inverses, vectors = scipy.sparse.linalg.eigsh(
-                inverse, count, which="LA", v0=start, ncv=min(space, size)
-            )
-        except scipy.sparse.linalg.ArpackError as error:
-            raise NotConverged(f"the vibration modes did not converge: {error}. Ask for fewer.") from error
-        order = np.argsort(-inverses)
-        modes = np.stack([moved_by(vectors[:, k]) for k in order], axis=1)
-        return 1.0 / inverses[order] + self._shift, modes
-
-    def _search_generalized(self, count: int, seed: int, space: int) -> tuple[np.ndarray, np.ndarray]:
-        """Find modes of K x = w^2 M x with M in the inner product: those nearest to the shift are the lowest."""
-        size = len(self._masses)
-        inverse = scipy.sparse.linalg.LinearOperator(
-            (size, size), matvec=self._factor.solve, dtype=np.float64
-        )
-        start = self._factor.solve(self._consistent @ np.random.default_rng(seed).standard_normal(size))
-        try:
-            squares, modes = scipy.sparse.linalg.eigsh(
-                inverse,  # K itself is not needed
-                count,
-                M=self._consistent,
-                sigma=self._shift,
-                OPinv=inverse,
-                v0=start,
-                ncv=min(space, len(self._moving)),
-            )
-        except scipy.sparse.linalg.ArpackError as error:
-            raise NotConverged(f"the vibration modes did not converge: {error}. Ask for fewer.") from error
-        order = np.argsort(squares)
-        return squares[order], modes[:, order]
-
-    def _squares_below(self, square: float) -> int:
-        return self._factorize(square).negative_pivots
-
-    def _factorize(self, shift: float) -> _core.FactorReport:
-        values = self._values.copy()
-        if self._inertia is None:
-            values[self._diagonal] -= shift * self._masses
-        else:
-            values -= shift * self._inertia
-        self.factorizations += 1
-        report = self._factor.factorize(values, *self._low_rank)
-        if not report.succeeded:
-            raise NotConverged(f"the vibration modes: {report.reason}")
-        return report
-
-
-def _root(masses: np.ndarray) -> tuple[Any, ...]:
-    """Return the functions that multiply by L and by L^T, for a diagonal M = L L^T."""
-    roots = np.sqrt(masses)
-    return (lambda x: roots * x), (lambda x: roots * x)
-
-
-def _coupled_root(inertia, masses: np.ndarray) -> tuple[Any, ...]:
-    """Return the functions that multiply by L and by L^T, for an M whose last rows, of rigid bodies, are coupled."""
-    coupled = inertia.copy()
-    coupled.setdiag(0.0)
-    coupled.eliminate_zeros()
-    first = coupled.indices.min(initial=len(masses))
-    root = scipy.sparse.diags_array(np.sqrt(masses)).tolil()
-    if first < len(masses):
-        root[first:, first:] = np.linalg.cholesky(inertia[first:, first:].toarray())
-    root = root.tocsc()
-    return (lambda x: root @ x), (lambda x: root.T @ x)
 
 
 def _inputs(scene: Scene, equilibrium: Equilibrium | None, values: dict[Any, Any] | None) -> Inputs:

@@ -1,0 +1,385 @@
+"""Vibrations, buckling and linear responses of scenes whose bodies act on each other with their own magnetic field."""
+
+import numpy as np
+import pytest
+import scipy
+
+import magshell as ms
+from magshell.model.scene.solve_inputs import Inputs
+from magshell.solve.adjoint.factorized import Factorized, stiffness_parts
+from magshell.solve.linear.stiffness import symmetric
+from magshell.solve.linear.vibration import consistent_masses
+
+torch = pytest.importorskip("torch")
+
+LENGTH, THICKNESS, MODULUS, DENSITY = 20e-3, 2e-4, 1e5, 2e3
+ACROSS = (0.0, 0.0, 6e4)  # [A/m]
+NARROW = (
+    1e-3,
+    (20, 1),
+)  # width [m] and cells; a wide one bends across too, so that its modes are not those of beams
+
+
+def strip(width, cells, own_field=True, **scene):
+    """Return a scene of a cantilever that is pressed along its length by 1 N/m per unit load factor."""
+    mesh = ms.meshes.rectangle(LENGTH, width, cells=cells)
+    sheet = ms.Shell(
+        mesh, thickness=THICKNESS, young_modulus=MODULUS, poisson_ratio=0.0, mass_density=DENSITY
+    )
+    press = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (-1.0, 0, 0))
+    kind = {"own_field": ms.OwnField()} if own_field else {"field": ms.UniformField()}
+    return ms.Scene(sheet, supports=ms.Clamp(mesh.edges_at(x=0.0)), loads=[press], **kind, **scene)
+
+
+def at_rest(scene, **inputs):
+    """Return the equilibrium of a strip in its own field, without a load."""
+    field = {"applied_flux_density": (0, 0, 0)} if scene.fields else {}
+    return ms.equilibrium(
+        scene, remanent_magnetization=ACROSS, load_factor=0.0, progress=False, **field, **inputs
+    )
+
+
+def clamped_mode(s):
+    """Return the slope of the first mode of a cantilever, at fractions s of its length."""
+    x = 1.8751040687 * s
+    part = (np.cosh(x[-1]) + np.cos(x[-1])) / (np.sinh(x[-1]) + np.sin(x[-1]))
+    return np.sinh(x) + np.sin(x) - part * (np.cosh(x) - np.cos(x))
+
+
+def energy_bent(scene, angles):
+    """Return the energy of the own field of a strip whose columns of cells are turned by these angles, not stretched."""
+    rest = scene.mesh.rest_positions
+    chord = LENGTH / len(angles)
+    steps = chord * np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
+    line = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    positions = line[np.round(rest[:, 0] / chord).astype(int)] + rest * (0.0, 1.0, 0.0)
+    inputs = Inputs(scene, ACROSS, None)
+    with inputs.in_core():
+        state = scene._model.state(positions, np.zeros(scene._bodies.n_rotations))
+        return scene._model.energies(state, inputs.load_parameters)["own field"]
+
+
+def stiffening(width, cells, slope):
+    """Return Rayleigh's quotient of a bending mode with the own field over that without. slope: of the mode, a function of
+    the fraction of the length.
+    """
+    scene = strip(width, cells)
+    fractions = np.append((np.arange(cells[0]) + 0.5) / cells[0], 1.0)
+    angles = slope(fractions)[:-1]
+    angles *= 0.05 / np.abs(angles).max()
+    magnetic = energy_bent(scene, angles) - energy_bent(scene, 0.0 * angles)
+    fine = np.linspace(0.0, 1.0, 2001)
+    along = slope(fine) * (np.abs(angles).max() / np.abs(slope(fractions)[:-1]).max())
+    curvatures = np.gradient(along, fine) / LENGTH
+    elastic = MODULUS * width * THICKNESS**3 / 24.0 * np.mean(curvatures**2) * LENGTH
+    return 1.0 + magnetic / elastic
+
+
+@pytest.fixture(scope="module")
+def rests():
+    """Return the equilibria of a strip with its own field and without."""
+    return [at_rest(strip(*NARROW, own_field)) for own_field in (True, False)]
+
+
+def test_own_field_raises_the_frequency_of_a_strip_that_is_magnetized_across(rests):
+    own, without = (ms.vibration_modes(rest.scene, rest, count=1).squares[0] for rest in rests)
+    ratio = stiffening(*NARROW, clamped_mode)
+    assert ratio > 1.2
+    assert own / without == pytest.approx(ratio, rel=0.02)
+
+
+def test_own_field_raises_the_buckling_load_of_a_strip_that_is_magnetized_across(rests):
+    field = [{}, {"applied_flux_density": (0, 0, 0)}]
+    own, without = (
+        ms.linear_buckling(rest.scene, rest, load_factor=1.0, **given).factors[0]
+        for rest, given in zip(rests, field, strict=True)
+    )
+    ratio = stiffening(*NARROW, lambda s: np.sin(0.5 * np.pi * s))
+    assert own / without == pytest.approx(ratio, rel=0.02)
+
+
+def flaps(gap=4e-3, modulus=5e8, cells=(3, 1), far=0.0, force=None):
+    """Return a scene of two clamped flaps above each other, or beside each other if `far` [m] apart.
+
+    force: N on each vertex at the tip of the first one.
+    """
+    mesh = ms.meshes.rectangle(0.02, 0.006, cells=cells)
+    meshes = [mesh, mesh.transformed(translation=(0.0, far, gap))]
+    both = [
+        ms.Shell(each, thickness=4e-4, young_modulus=modulus, poisson_ratio=0.3, mass_density=DENSITY)
+        for each in meshes
+    ]
+    held = [ms.Clamp(each.mesh.edges_at(x=0.0), body=each) for each in both]
+    tips = mesh.vertices_at(x=0.02)
+    loads = [] if force is None else [ms.PointLoad(tips, force, body=both[0])]
+    return ms.Scene(both, supports=held, loads=loads, own_field=ms.OwnField())
+
+
+def oblique(scene):
+    rng = np.random.default_rng(4)
+    return 4e4 * rng.uniform(0.5, 1.5, (scene.mesh.n_faces, 3)) * (1.0, 0.5, 1.0)
+
+
+def dense_stiffness(rest, load_parameters=None, moved=0.0):
+    """Return the whole Hessian of the free degrees of freedom, by one product for each."""
+    model, c = rest.scene._model, rest._load_parameters if load_parameters is None else load_parameters
+    with rest._values.in_core():
+        model.held_forces(rest._state, rest._angle_branches, rest._load_parameters)
+        columns = [
+            model.reduce(model.hessian_product(rest._state + moved, c, model.expand(unit)))
+            for unit in np.eye(model.free_size)
+        ]
+    matrix = np.array(columns)
+    assert np.abs(matrix - matrix.T).max() < 1e-10 * np.abs(matrix).max()
+    return 0.5 * (matrix + matrix.T)
+
+
+def dense_squares(rest):
+    """Return all squares of angular frequencies, by a decomposition of dense matrices."""
+    matrix = dense_stiffness(rest)
+    masses = rest.scene._model.free_weights(rest._values.masses)
+    moving, still = np.flatnonzero(masses), np.flatnonzero(masses == 0.0)
+    inner = matrix[np.ix_(still, still)]
+    coupling = matrix[np.ix_(still, moving)]
+    condensed = matrix[np.ix_(moving, moving)] - coupling.T @ np.linalg.solve(inner, coupling)
+    roots = np.sqrt(masses[moving])
+    return np.linalg.eigvalsh(condensed / roots[:, None] / roots)
+
+
+@pytest.fixture(params=[True, False], ids=["dense", "iterative"])
+def dense(request, monkeypatch):
+    """Take the own field of an eigenvalue problem as a dense matrix, or as products, as in large scenes."""
+    if not request.param:
+        monkeypatch.setattr("magshell.solve.adjoint.factorized._MOST_DENSE", 0)
+
+
+@pytest.mark.usefixtures("dense")
+def test_frequencies_equal_those_of_a_dense_decomposition():
+    scene = flaps()
+    rest = ms.equilibrium(scene, remanent_magnetization=oblique(scene), progress=False)
+    modes = ms.vibration_modes(scene, rest, count=8)
+    exact = dense_squares(rest)
+    np.testing.assert_allclose(modes.squares, exact[:8], rtol=1e-8)
+    free = ms.vibration_modes(scene, count=8).squares  # at rest without magnetization
+    assert np.abs(modes.squares / free - 1.0).max() > 1e-4
+    assert modes.unstable == 0
+
+
+@pytest.mark.usefixtures("dense")
+def test_modes_that_grow_are_counted_with_the_own_field():
+    """Check a straight strip under twelve times its buckling load, and ask for fewer modes than grow."""
+    scene = strip(4e-3, (8, 2))
+    factor = ms.linear_buckling(scene, at_rest(scene), load_factor=1.0).factors[0]
+    pressed = ms.equilibrium(
+        scene,
+        remanent_magnetization=ACROSS,
+        load_factor=12.0 * factor,
+        require_stable=False,
+        progress=False,
+    )
+    exact = dense_squares(pressed)
+    growing = int(np.count_nonzero(exact < 0.0))
+    assert growing >= 2 and not pressed.stable
+    modes = ms.vibration_modes(scene, pressed, count=1)
+    assert modes.unstable == growing
+    assert modes.squares[0] == pytest.approx(exact[0], rel=1e-8)
+
+
+@pytest.mark.usefixtures("dense")
+def test_equal_frequencies_are_all_found():
+    """Check two flaps 10 m apart, which hardly feel each other, so that all frequencies are double."""
+    scene = flaps(far=10.0, gap=0.0)
+    rest = ms.equilibrium(scene, remanent_magnetization=(2e4, 0, 4e4), progress=False)
+    squares = ms.vibration_modes(scene, rest, count=7).squares
+    np.testing.assert_allclose(squares, dense_squares(rest)[:7], rtol=1e-8)
+    assert squares[1] == pytest.approx(squares[0], rel=1e-9) and squares[2] > 1.1 * squares[1]
+
+
+@pytest.mark.usefixtures("dense")
+def test_consistent_masses_with_the_own_field():
+    scene = flaps(far=10.0, gap=0.0)
+    rest = ms.equilibrium(scene, remanent_magnetization=(2e4, 0, 4e4), progress=False)
+    squares = ms.vibration_modes(scene, rest, count=5, mass="consistent").squares
+    masses = consistent_masses(rest._values).toarray()
+    inverses = scipy.linalg.eigh(masses, dense_stiffness(rest), eigvals_only=True)[::-1]
+    np.testing.assert_allclose(squares, 1.0 / inverses[:5], rtol=1e-8)
+    assert squares[1] == pytest.approx(squares[0], rel=1e-9)
+
+
+@pytest.mark.usefixtures("dense")
+def test_buckling_factors_equal_those_of_a_dense_decomposition():
+    scene = flaps(force=(-0.02, 0, 0))
+    rest = ms.equilibrium(scene, remanent_magnetization=oblique(scene), load_factor=0.0, progress=False)
+    found = ms.linear_buckling(scene, rest, load_factor=1.0, modes=3)
+    response = ms.linear_response(scene, rest, load_factor=1.0)
+    model = scene._model
+    step = 1e-6 / np.abs(response.displacements).max()
+    along = model.state(
+        scene.mesh.rest_positions + response.displacements, np.asarray(response.edge_rotations)
+    ) - model.state(scene.mesh.rest_positions, np.zeros(scene._bodies.n_rotations))
+    to = response._load_parameters
+    ahead, behind = (
+        dense_stiffness(rest, rest._load_parameters + t * (to - rest._load_parameters), t * along)
+        for t in (step, -step)
+    )
+    inverses = scipy.linalg.eigh(-(ahead - behind) / (2 * step), dense_stiffness(rest), eigvals_only=True)
+    np.testing.assert_allclose(found.factors, 1.0 / inverses[::-1][:3], rtol=1e-5)
+
+
+def test_buckling_factors_have_no_gradient_with_the_own_field():
+    scene = flaps(force=(-0.02, 0, 0))
+    rest = ms.equilibrium(scene, remanent_magnetization=oblique(scene), load_factor=0.0, progress=False)
+    factor = torch.tensor(1.0, dtype=torch.float64, requires_grad=True)
+    found = ms.linear_buckling(scene, rest, load_factor=factor)
+    with pytest.raises(ms.NoGradient, match="no gradient of buckling factors with own_field"):
+        found.factors.sum().backward()
+
+
+def test_a_response_with_the_own_field_is_the_slope_of_equilibria():
+    scene = flaps(force=(1e-4, 2e-4, -3e-4))
+    given = {"remanent_magnetization": oblique(scene), "solver": ms.MixedNewton(tolerance=1e-13)}
+    rest = ms.equilibrium(scene, load_factor=0.5, progress=False, **given)
+    found = ms.linear_response(scene, rest, load_factor=1.5)
+    step = 1e-3
+    ends = [
+        ms.equilibrium(scene, load_factor=0.5 + sign * step, start=rest, progress=False, **given)
+        for sign in (1, -1)
+    ]
+    slope = (ends[0].positions - ends[1].positions) / (2 * step)
+    np.testing.assert_allclose(found.displacements, slope, rtol=0, atol=1e-6 * np.abs(slope).max())
+
+
+def test_a_response_about_an_equilibrium_has_gradients_by_the_magnetization():
+    scene = flaps(force=(1e-4, 2e-4, -3e-4))
+    exact = {"solver": ms.MixedNewton(tolerance=1e-13), "progress": False}
+    rng = np.random.default_rng(7)
+    base, along = oblique(scene), 4e4 * rng.standard_normal((scene.mesh.n_faces, 3))
+    weights = torch.as_tensor(rng.standard_normal((scene.mesh.n_vertices, 3)))
+    start = ms.equilibrium(scene, remanent_magnetization=base, load_factor=0.5, **exact)
+
+    def loss(magnetization):
+        rest = ms.equilibrium(
+            scene, remanent_magnetization=magnetization, load_factor=0.5, start=start, **exact
+        )
+        moved = torch.as_tensor(ms.linear_response(scene, rest, load_factor=1.5).displacements)
+        return (weights * moved).sum()
+
+    given = torch.tensor(base, requires_grad=True)
+    loss(given).backward()
+    step = 1e-2
+    pairs = [(3 / 4, 1), (-3 / 20, 2), (1 / 60, 3)]
+    slope = sum(
+        c * (loss(base + n * step * along).item() - loss(base - n * step * along).item()) for c, n in pairs
+    )
+    by = given.grad.numpy() * along
+    assert by.sum() == pytest.approx(slope / step, abs=1e-6 * np.abs(by).sum())
+
+
+def test_at_rest_the_own_field_is_a_load_like_others():
+    """Check that the response at rest is the limit of equilibria whose forces by the own field are small."""
+    scene = flaps()
+    magnetization = 0.02 * oblique(scene)  # forces grow with its square
+    found = ms.linear_response(scene, remanent_magnetization=magnetization)
+    exact = ms.equilibrium(
+        scene,
+        remanent_magnetization=magnetization,
+        progress=False,
+        solver=ms.MixedNewton(tolerance=1e-13),
+    )
+    size = np.abs(exact.displacements).max()
+    assert size > 0.0
+    np.testing.assert_allclose(found.displacements, exact.displacements, rtol=0, atol=1e-5 * size)
+
+
+def test_support_motions_pull_with_the_own_field_too():
+    mesh = ms.meshes.rectangle(0.02, 0.006, cells=(3, 1))
+    meshes = [mesh, mesh.transformed(translation=(1e-3, 5e-4, 3e-3))]
+    both = [
+        ms.Shell(each, thickness=4e-4, young_modulus=5e8, poisson_ratio=0.3, mass_density=DENSITY)
+        for each in meshes
+    ]
+    held = [
+        ms.Clamp(mesh.edges_at(x=0.0), body=both[0]),
+        ms.Clamp(meshes[1].edges_at(x=1e-3), body=both[1], displacement=(0, 0, -1e-3)),
+    ]
+    scene = ms.Scene(both, supports=held, own_field=ms.OwnField())
+    given = {"remanent_magnetization": oblique(scene), "solver": ms.MixedNewton(tolerance=1e-13)}
+    rest = ms.equilibrium(scene, support_factor=0.0, progress=False, **given)
+    found = ms.linear_response(scene, rest, support_factor=1.0)
+    step = 1e-3
+    ends = [
+        ms.equilibrium(scene, support_factor=sign * step, start=rest, progress=False, **given)
+        for sign in (1, -1)
+    ]
+    slope = (ends[0].positions - ends[1].positions) / (2 * step)
+    np.testing.assert_allclose(found.displacements, slope, rtol=0, atol=1e-5 * np.abs(slope).max())
+    lower = slope[: mesh.n_vertices]
+    assert np.abs(lower).max() > 1e-3 * np.abs(slope).max()  # the other flap follows
+
+
+@pytest.mark.usefixtures("dense")
+def test_free_magnets_vibrate_in_the_field_of_a_sheet():
+    """Check a magnet above a sheet, held by a spring joint, against a dense decomposition of the same matrices."""
+    mesh = ms.meshes.rectangle(0.02, 0.006, cells=(4, 2))
+    sheet = ms.Shell(
+        mesh,
+        thickness=4e-4,
+        young_modulus=3e6,
+        poisson_ratio=0.3,
+        mass_density=DENSITY,
+        remanent_magnetization=(3e4, 0, 4e4),
+    )
+    carried = np.flatnonzero(mesh.rest_positions[:, 0] > 0.012)
+    magnet = ms.RigidBody(
+        carried,
+        body=sheet,
+        mass=1e-5,
+        inertia=(1e-10, 2e-10, 2.5e-10),
+        center=(0.02, 0.003, 1e-3),
+        magnetic_moment=(1e-4, 0, 2e-4),
+    )
+    scene = ms.Scene([sheet, magnet], supports=ms.Clamp(mesh.edges_at(x=0.0)), own_field=ms.OwnField())
+    rest = ms.equilibrium(scene, progress=False)
+    squares = ms.vibration_modes(scene, rest, count=4).squares
+    model = scene._model
+    with rest._values.in_core():
+        parts = stiffness_parts(model, rest._state, rest._load_parameters)
+        size, starts, rows, values = parts.triangle
+        weights = model.free_weight_values(rest._values.masses)
+        matrices = [symmetric(size, starts, rows, numbers).toarray() for numbers in (values, weights)]
+        matrices[0] += np.array([parts.times_others(unit) for unit in np.eye(size)])
+    # Edge rotations have no mass: the pencil is turned round.
+    inverses = scipy.linalg.eigh(matrices[1], matrices[0], eigvals_only=True)[::-1]
+    np.testing.assert_allclose(squares, 1.0 / inverses[:4], rtol=1e-8)
+
+
+def test_the_inertia_counts_parts_of_low_rank_beside_the_own_field():
+    """Check matrices whose sparse part is indefinite, with columns beside it, against dense ones."""
+    scene = flaps()
+    rest = ms.equilibrium(scene, remanent_magnetization=oblique(scene), progress=False)
+    model, rng = scene._model, np.random.default_rng(0)
+    with rest._values.in_core():
+        parts = stiffness_parts(model, rest._state, rest._load_parameters)
+        size, starts, rows, values = parts.triangle
+        eigenvalues, vectors = scipy.linalg.eigh(symmetric(size, starts, rows, values).toarray())
+        between = 0.5 * (eigenvalues[1] + eigenvalues[2])  # the lowest two nearly equal each other
+        cases = [  # shift of the sparse part, columns and their stiffnesses, and the negative eigenvalues of all
+            (between, [0, 1], (2 * between, 3 * between), 0),
+            (between, [5], (-2 * eigenvalues[5],), 3),
+            (0.0, [4], (-2 * eigenvalues[4],), 1),
+        ]
+        for shift, places, stiffness, negative in cases:
+            moved = values.copy()
+            moved[starts[:-1]] -= shift
+            given = parts._replace(
+                triangle=(size, starts, rows, moved), low_rank=(vectors[:, places], np.array(stiffness))
+            )
+            dense = symmetric(size, starts, rows, moved).toarray()
+            dense += np.array([given.times_others(unit) for unit in np.eye(size)])
+            factorized = Factorized(given, model.free_points)
+            assert np.count_nonzero(np.linalg.eigvalsh(dense) < 0.0) == negative
+            found = factorized.report.negative_pivots  # nearly equal ones count once
+            assert min(1, negative) <= found <= negative and not factorized.report.perturbed_pivots
+            forces = rng.standard_normal(size)
+            left = dense @ factorized.solve(forces) - forces
+            assert np.linalg.norm(left) < 1e-9 * np.linalg.norm(forces)
