@@ -258,7 +258,10 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     if (gradient.rest.asked)
         result["rest"] = py::make_tuple(at_nodes(model, gradient.rest.by_nodes),
                                         at_nodes(model, gradient.rest.by_prescribed));
-    result["positions"] = model.bodies().gradient_by_vectors(gradient.positions);
+    const Rows3 by_vertices = model.bodies().gradient_by_vectors(gradient.positions);
+    const Rows3 by_points = model.bodies().points(gradient.positions);  // of rigid bodies, too
+    result["positions"] = by_vertices;
+    result["own_points"] = Rows3(by_points.bottomRows(by_points.rows() - by_vertices.rows()));
     result["edge_rotations"] = model.bodies().edge_rotations(gradient.positions);
     result["velocities"] = model.bodies().gradient_by_vectors(gradient.velocities);
     result["own_velocities"] = model.bodies().points(gradient.velocities);

@@ -201,6 +201,13 @@ def test_batches_of_motions_refuse_bad_input():
             {"batch": 3, "start": torch.tensor(scene.mesh.rest_positions.copy(), requires_grad=True)},
             "start of a batch has no gradient",
         ),
+        (
+            {
+                "batch": 3,
+                "start": ms.equilibrium(scene, applied_flux_density=torch.zeros((3, 3), requires_grad=True)),
+            },
+            "start of a batch has no gradient",
+        ),
     ):
         with pytest.raises(ValueError, match=match):
             ms.simulate(scene, **{"applied_flux_density": field, **STEPS, **changes})

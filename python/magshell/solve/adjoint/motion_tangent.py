@@ -260,6 +260,8 @@ class _Direction:
             own = np.zeros((len(self._mass) - n_v, 3))
             target = self._state if name == "positions" else self._velocity
             target += self._vector(rows, own)
+        elif name == "own_points":
+            self._state += self._vector(np.zeros((n_v, 3)), change)
         elif name == "edge_rotations":
             rest, none = scene.mesh.rest_positions, np.zeros(scene._bodies.n_rotations)
             self._state += scene._model.state(rest, change) - scene._model.state(rest, none)

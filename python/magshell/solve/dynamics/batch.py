@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._input.arrays import count
 from ..._input.quantity import quantity
-from ..._input.tensors import is_tensor
+from ..._input.tensors import is_tensor, requires_gradient
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ..._runtime.worker_threads import checked_threads
 from ...errors import Interrupted
@@ -180,16 +180,23 @@ def _member(
 
 
 def _starts(start: Any, members: int) -> list[Any]:
-    """Return the start of each member. Raises ValueError if there is another number of them, or if a tensor would lose its
-    gradient."""
-    if is_tensor(start) and start.requires_grad:
-        raise ValueError("start of a batch has no gradient: detach it, or simulate the members one by one")
+    """Return the start of each member. Raises ValueError if there is another number of them, or if a gradient by them
+    would be lost.
+    """
     several = isinstance(start, EquilibriumSet | EquilibriumBatch | TrajectoryBatch)
     if isinstance(start, np.ndarray | list) or is_tensor(start):
         states = isinstance(start, list) and isinstance(start[0], Equilibrium | Trajectory | MotionState)
         several = states or np.ndim(start) == 3
-    if not several:
-        return [start] * members
-    if len(start) != members:
+    if several and len(start) != members:
         raise ValueError(f"start has {len(start)} members, but batch={members}")
-    return [start[k] for k in range(members)]
+    starts = [start[k] for k in range(members)] if several else [start] * members
+    if any(map(_requires_gradient, (start, *starts))):
+        raise ValueError(
+            "start of a batch has no gradient: detach it, solve for it under torch.no_grad(), or simulate each member alone"
+        )
+    return starts
+
+
+def _requires_gradient(start: Any) -> bool:
+    """Return whether a start is a tensor with a gradient, or a result or state that holds some."""
+    return requires_gradient(getattr(start, "positions", start))

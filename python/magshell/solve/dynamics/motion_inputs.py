@@ -388,6 +388,8 @@ class MotionInputs:
             if requires_gradient(start.positions):
                 inputs.take("positions", start.positions)
                 inputs.take("edge_rotations", start.edge_rotations)
+                if inputs.scene.rigid_parts:
+                    inputs.take("own_points", start._own_points)
             return MotionState(0.0, start._state, still, start._angle_branches)
         if isinstance(start, MotionState | DifferentiableState):
             state = start if isinstance(start, MotionState) else start._taken_by(inputs)
