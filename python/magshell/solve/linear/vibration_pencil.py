@@ -53,7 +53,7 @@ class VibrationPencil:
         masses: np.ndarray,
         slow_square: float,
         inertia: np.ndarray | None = None,
-        consistent=None,
+        consistent: scipy.sparse.csc_array | None = None,
     ):
         *pattern, self._values = stiffness.triangle
         self._stiffness = stiffness
@@ -67,7 +67,7 @@ class VibrationPencil:
                 _root(masses) if inertia is None else _coupled_root(symmetric(*pattern, inertia), masses)
             )
         self._factor = _core.analyze(*pattern, points=points)
-        self.factorizations = 0
+        self.factorizations: int = 0
         stiffest = self._values[self._diagonal][self._moving] / masses[self._moving]
         self._lost = _ROUND_OFF_SHARE * stiffest.max()
         # Below zero, because nothing may resist a rigid motion; and further, the faster something grows.
