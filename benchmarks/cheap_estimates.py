@@ -23,7 +23,7 @@ from magshell.model.scene.finer_scene import finer_scene
 from magshell.solve.accuracy.enriched import load_keywords, positions_of
 from magshell.solve.accuracy.error_estimate import finer_meshes
 from magshell.solve.accuracy.output_value import Output
-from magshell.solve.adjoint.factorized import Factorized
+from magshell.solve.adjoint.factorized import Factorized, StiffnessParts
 from magshell.solve.statics.single_solve import inputs_of
 
 from .estimates import ESTIMATED, Asked
@@ -68,7 +68,8 @@ class Stiffness:
 def _solved(matrix: Any, forces: np.ndarray, points: np.ndarray) -> np.ndarray:
     lower = scipy.sparse.tril(matrix).tocsc()
     lower.sort_indices()
-    factor = Factorized(len(forces), lower.indptr, lower.indices, lower.data, points)
+    triangle = (len(forces), lower.indptr, lower.indices, lower.data)
+    factor = Factorized(StiffnessParts(triangle), points)
     return factor.solve(forces)
 
 
