@@ -9,17 +9,16 @@ from __future__ import annotations
 import argparse
 import importlib
 import sys
-import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from magshell._runtime.files import replacing
-from magshell.errors import UnitWarning
 
 from .report import (
     add_common_arguments,
     as_json,
     read_results,
+    run_part,
     set_default_rounds,
     set_threads,
     setting,
@@ -100,9 +99,7 @@ def _part(name: str, arguments: list[str]) -> int:
     set_default_rounds(options)
     set_threads(options.threads)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UnitWarning)  # some references have no units: strips of length 10
-            results = as_json(part.run(options))
+        results = as_json(run_part(part, options))
     except ImportError as error:
         return _missing(error, f"{name} did not end")
     if options.json:

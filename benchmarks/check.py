@@ -25,6 +25,7 @@ from .ratios import KINDS, Ratio, collected
 from .report import (
     add_common_arguments,
     print_table,
+    run_part,
     set_default_rounds,
     set_threads,
     setting,
@@ -113,7 +114,7 @@ def measured(part: str, arguments: list[str]) -> dict[str, Ratio]:
     set_threads(options.threads)
     before = loop()
     with contextlib.redirect_stdout(io.StringIO()), collected() as notes:
-        module.run(options)
+        run_part(module, options)
     unit = math.sqrt(before * loop())
     found: dict[str, Ratio] = {}
     for ratio in notes:

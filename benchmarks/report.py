@@ -7,8 +7,10 @@ import json
 import os
 import platform
 import sys
+import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy
@@ -21,6 +23,13 @@ from magshell._runtime.progress import progress_bar
 
 if TYPE_CHECKING:
     from tqdm import tqdm
+
+
+def run_part(module: ModuleType, options: argparse.Namespace) -> Any:
+    """Run a part, and return its results. Nothing warns of references without units, such as strips of length 10."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ms.UnitWarning)
+        return module.run(options)
 
 
 def add_common_arguments(parser: argparse.ArgumentParser) -> None:
