@@ -7,6 +7,7 @@ elements that are near; a six-node face has them at three levels through its thi
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -101,7 +102,7 @@ def _chunks(numbers: np.ndarray) -> list[np.ndarray]:
     return np.split(numbers, range(_TOGETHER, len(numbers), _TOGETHER))
 
 
-class _Elements:
+class _Elements(ABC):
     """The magnetized elements of a body.
 
     rest, now: (n, k, 3) m, the nodes of each. magnetization: (n, 3) A/m, the remanent one.
@@ -115,9 +116,9 @@ class _Elements:
         self.centers: np.ndarray = now.mean(axis=1)
         self.sizes: np.ndarray = 2.0 * np.linalg.norm(now - self.centers[:, None], axis=2).max(axis=1)
 
+    @abstractmethod
     def moments(self, which: np.ndarray, fine: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (n, p, 3) m of some elements, and the magnetic moments there, A m2."""
-        raise NotImplementedError
 
 
 class _Tetrahedra(_Elements):
