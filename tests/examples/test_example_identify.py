@@ -1,4 +1,8 @@
-"""Identification on a coarser mesh, with fewer nodes: its errors, its limits, and its picture."""
+"""Identification on a coarser mesh, with fewer nodes: its errors, its limits, and its picture.
+
+The searches take 60 iterations: after 25 the error of M still lies between 0.296 and 0.319, by the rounding of the
+start (1e-14 of it, in eight runs), after 60 between 0.194 and 0.208 (0.172 and 0.174 from exact data).
+"""
 
 import numpy as np
 import pytest
@@ -8,7 +12,7 @@ from example_modules import load
 @pytest.fixture(scope="module")
 def identified() -> dict:
     return load("identify").main(
-        cells=(20, 12), nodes=(6, 4), prices=(1.0, 0.1, 0.03, 0.01), iterations=25, limits_on=(10, 6)
+        cells=(20, 12), nodes=(6, 4), prices=(1.0, 0.1, 0.03, 0.01, 0.003), iterations=60, limits_on=(10, 6)
     )
 
 
