@@ -395,13 +395,12 @@ double MagneticTerm<Law>::field_sampling_error(const double* q, const LoadParame
     find_neighbours();
     const Index n = surface_.n_faces();
     struct Sample {
-        Vec3 point, moment;
+        Vec3 point, moment, force;
         Mat3 gradient;
+        double couple;  // [N m] its size
     };
-    std::vector<Sample> samples(n);
-    std::vector<Mat3> rates(n);  // F' [N/m]
-    Vec3 force = Vec3::Zero(), error = Vec3::Zero();
-    double forces = 0.0, couples = 0.0;
+    std::vector<Sample> samples(n);  // several threads fill them: sums are formed below
+    std::vector<Mat3> rates(n);      // F' [N/m]
     loop_.each_group([&](Index group) {
         SimdVec3 x[3];
         loop_.gather(group, q, x);
@@ -417,14 +416,17 @@ double MagneticTerm<Law>::field_sampling_error(const double* q, const LoadParame
                 here.gradient(k / 3, k % 3) = fields_.at_barycenter[group].gradient.at[k][lane];
                 rates[f](k / 3, k % 3) = e.volume[lane] * fields_.at_barycenter[group].curvature.at[k][lane];
             }
-            const Vec3 pull = here.gradient.transpose() * here.moment;
-            force += pull;
-            forces += pull.norm();
-            couples += here.moment.cross(lane_of(fields_.at_barycenter[group].flux, lane)).norm();
+            here.force = here.gradient.transpose() * here.moment;
+            here.couple = here.moment.cross(lane_of(fields_.at_barycenter[group].flux, lane)).norm();
         }
     });
+    Vec3 force = Vec3::Zero(), error = Vec3::Zero();
+    double forces = 0.0, couples = 0.0;
     for (Index f = 0; f < n; ++f) {
         const Sample& here = samples[f];
+        force += here.force;
+        forces += here.force.norm();
+        couples += here.couple;
         if (here.moment.isZero(0.0)) continue;
         Vec3 sum = Vec3::Zero();
         double spread = 0.0;  // s [m2]
