@@ -7,12 +7,12 @@ import magshell as ms
 from magshell import _core
 from magshell.model.scene.solve_inputs import Inputs
 
-CELLS, SIZE, THICKNESS = 40, 0.04, 5e-4  # sides and thickness in m
+CELLS, SIZE, THICKNESS = 28, 0.04, 5e-4  # sides and thickness in m
 KINDS = {"tangential": (1, 1, 0), "normal": (0, 0, 1), "oblique": (1, 1, 1)}
 
 
 def curled_sheet(components, accuracy, law="stretches"):
-    """Return a sheet on an arc with another magnetization in each face, its inputs and state: 19,520 points or more."""
+    """Return a sheet on an arc with another magnetization in each face, its inputs and state: 9,576 points or more."""
     rng = np.random.default_rng(3)
     mesh = ms.meshes.rectangle(SIZE, SIZE, cells=(CELLS, CELLS))
     sheet = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e6, magnetization_law=law)
