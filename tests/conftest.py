@@ -30,6 +30,8 @@ from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
     pytest_xdist_auto_num_workers,
 )
 
+from magshell._runtime.broken_pipes import ignore_broken_pipes  # noqa: E402
+
 
 def pytest_report_header() -> str | None:
     """Warn of a build without the kernels that the tests of the core call."""
@@ -45,6 +47,8 @@ def _ctrl_c_stays_an_exception() -> Iterator[None]:
     """Fail a test after which Ctrl-C would end the process, as a plain `gmsh.initialize()` leaves it, and put that right."""
     before = signal.getsignal(signal.SIGINT)
     yield
+    # A test that calls gmsh itself would else let a broken pipe end this process, without a word, in a later test.
+    ignore_broken_pipes()
     after = signal.getsignal(signal.SIGINT)
     if after != before:
         signal.signal(signal.SIGINT, before)

@@ -12,6 +12,7 @@ from concurrent import futures
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from typing import Any, Protocol
 
+from ..._runtime.broken_pipes import ignore_broken_pipes
 from .run_start import CallOff, Outcome, attempt_packed, attempt_sent, failure, this_process
 from .serialization import packed
 from .worker_processes import WorkerDied, WorkerProcesses
@@ -45,6 +46,7 @@ def drive(
     task: function of a number and a CallOff that returns the arguments for the executor's `submit`, as `tasks` gives.
     workers, attempts: as in ms.multistart. in_flight: how many calls the executor holds at most; None: all.
     """
+    ignore_broken_pipes()  # a process that dies leaves pipes without reader
     if executor is not None:
         _drive(work, executor, task, bar, in_flight)
     elif work.unfinished:

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from ..._runtime.broken_pipes import ignore_broken_pipes
+
 # All options that affect the mesh; they replace the user's settings during the session.
 _OPTIONS = {
     "General.Terminal": 0,
@@ -40,6 +42,7 @@ def gmsh_session(mesh_size: float) -> Iterator[Any]:
     if started_here:
         # not interruptible: otherwise gmsh handles Ctrl-C itself, which works in the main thread only
         gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
+        ignore_broken_pipes()
     users_model = gmsh.model.getCurrent()
     users_options = {name: gmsh.option.getNumber(name) for name in _OPTIONS}
     for name, value in {**_OPTIONS, "Mesh.MeshSizeMax": mesh_size}.items():
