@@ -3,32 +3,30 @@
 import numpy as np
 import pytest
 import scipy
+from current_strip import BendingStrip
 
 import magshell as ms
-from magshell.model.scene.solve_inputs import Inputs
 from magshell.solve.adjoint.factorized import Factorized, stiffness_parts
 from magshell.solve.linear.stiffness import symmetric
 from magshell.solve.linear.vibration import consistent_masses
 
 torch = pytest.importorskip("torch")
 
-LENGTH, THICKNESS, MODULUS, DENSITY = 20e-3, 2e-4, 1e5, 2e3
+THICKNESS, MODULUS, DENSITY = 2e-4, 1e5, 2e3
 ACROSS = (0.0, 0.0, 6e4)  # [A/m]
-NARROW = (
-    1e-3,
-    (20, 1),
-)  # width [m] and cells; a wide one bends across too, so that its modes are not those of beams
+LENGTH = 10e-3  # [m] of the strips that are compared with a loop of current
+NARROW, WIDE = (1e-3, (16, 2)), (2e-3, (10, 2))  # width [m] and cells
 
 
-def strip(width, cells, own_field=True, **scene):
+def strip(width, cells, own_field=True, length=LENGTH):
     """Return a scene of a cantilever that is pressed along its length by 1 N/m per unit load factor."""
-    mesh = ms.meshes.rectangle(LENGTH, width, cells=cells)
+    mesh = ms.meshes.rectangle(length, width, cells=cells)
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=MODULUS, poisson_ratio=0.0, mass_density=DENSITY
     )
-    press = ms.EdgeLoad(mesh.edges_at(x=LENGTH), (-1.0, 0, 0))
+    press = ms.EdgeLoad(mesh.edges_at(x=length), (-1.0, 0, 0))
     kind = {"own_field": ms.OwnField()} if own_field else {"field": ms.UniformField()}
-    return ms.Scene(sheet, supports=ms.Clamp(mesh.edges_at(x=0.0)), loads=[press], **kind, **scene)
+    return ms.Scene(sheet, supports=ms.Clamp(mesh.edges_at(x=0.0)), loads=[press], **kind)
 
 
 def at_rest(scene, **inputs):
@@ -39,63 +37,64 @@ def at_rest(scene, **inputs):
     )
 
 
-def clamped_mode(s):
-    """Return the slope of the first mode of a cantilever, at fractions s of its length."""
-    x = 1.8751040687 * s
-    part = (np.cosh(x[-1]) + np.cos(x[-1])) / (np.sinh(x[-1]) + np.sin(x[-1]))
-    return np.sinh(x) + np.sin(x) - part * (np.cosh(x) - np.cos(x))
-
-
-def energy_bent(scene, angles):
-    """Return the energy of the own field of a strip whose columns of cells are turned by these angles, not stretched."""
-    rest = scene.mesh.rest_positions
-    chord = LENGTH / len(angles)
-    steps = chord * np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
-    line = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-    positions = line[np.round(rest[:, 0] / chord).astype(int)] + rest * (0.0, 1.0, 0.0)
-    inputs = Inputs(scene, ACROSS, None)
-    with inputs.in_core():
-        state = scene._model.state(positions, np.zeros(scene._bodies.n_rotations))
-        return scene._model.energies(state, inputs.load_parameters)["own field"]
-
-
-def stiffening(width, cells, slope):
-    """Return Rayleigh's quotient of a bending mode with the own field over that without. slope: of the mode, a function of
-    the fraction of the length.
-    """
-    scene = strip(width, cells)
-    fractions = np.append((np.arange(cells[0]) + 0.5) / cells[0], 1.0)
-    angles = slope(fractions)[:-1]
-    angles *= 0.05 / np.abs(angles).max()
-    magnetic = energy_bent(scene, angles) - energy_bent(scene, 0.0 * angles)
-    fine = np.linspace(0.0, 1.0, 2001)
-    along = slope(fine) * (np.abs(angles).max() / np.abs(slope(fractions)[:-1]).max())
-    curvatures = np.gradient(along, fine) / LENGTH
-    elastic = MODULUS * width * THICKNESS**3 / 24.0 * np.mean(curvatures**2) * LENGTH
-    return 1.0 + magnetic / elastic
-
-
 @pytest.fixture(scope="module")
 def rests():
-    """Return the equilibria of a strip with its own field and without."""
+    """Return the equilibria of a narrow strip with its own field and without."""
     return [at_rest(strip(*NARROW, own_field)) for own_field in (True, False)]
 
 
-def test_own_field_raises_the_frequency_of_a_strip_that_is_magnetized_across(rests):
+def bending_strip(width):
+    return BendingStrip(LENGTH, width, THICKNESS, MODULUS, DENSITY, ACROSS[2])
+
+
+def test_own_field_raises_the_frequency_of_a_strip_as_a_loop_of_current(rests):
     own, without = (ms.vibration_modes(rest.scene, rest, count=1).squares[0] for rest in rests)
-    ratio = stiffening(*NARROW, clamped_mode)
-    assert ratio > 1.2
-    assert own / without == pytest.approx(ratio, rel=0.02)
+    loop = bending_strip(NARROW[0])
+    ratio = loop.ratio(loop.mass)
+    assert 1.2 < ratio < 1.0 + 0.8 * loop.magnetic[0, 0] / loop.elastic[0, 0]  # less than of an arc
+    assert own / without - 1.0 == pytest.approx(ratio - 1.0, rel=0.03)
 
 
-def test_own_field_raises_the_buckling_load_of_a_strip_that_is_magnetized_across(rests):
+def test_own_field_raises_the_buckling_load_of_a_strip_as_a_loop_of_current(rests):
     field = [{}, {"applied_flux_density": (0, 0, 0)}]
     own, without = (
         ms.linear_buckling(rest.scene, rest, load_factor=1.0, **given).factors[0]
         for rest, given in zip(rests, field, strict=True)
     )
-    ratio = stiffening(*NARROW, lambda s: np.sin(0.5 * np.pi * s))
-    assert own / without == pytest.approx(ratio, rel=0.02)
+    loop = bending_strip(NARROW[0])
+    assert own / without - 1.0 == pytest.approx(loop.ratio(loop.shortening) - 1.0, rel=0.03)
+
+
+def test_a_wide_strip_whose_columns_stay_straight_is_a_loop_of_current_too():
+    """Check a strip of a fifth of its length; where it may bend across, its own field makes it less stiff."""
+    ratios = {}
+    for straight in (True, False):
+        own, without = (lowest_square(at_rest(strip(*WIDE, own)), straight) for own in (True, False))
+        ratios[straight] = own / without
+    loop = bending_strip(WIDE[0])
+    assert ratios[True] - 1.0 == pytest.approx(loop.ratio(loop.mass) - 1.0, rel=0.02)
+    assert ratios[False] < ratios[True] - 0.005
+
+
+def lowest_square(rest, straight):
+    """Return the lowest square of an angular frequency. straight: whether each column of vertices moves as one."""
+    scene, model = rest.scene, rest.scene._model
+    if not straight:
+        return dense_squares(rest)[0]
+    along = scene.mesh.rest_positions[:, 0]
+    still = np.zeros(scene._bodies.n_rotations)
+    at_rest = model.state(scene.mesh.rest_positions, still)
+    columns = []
+    for x in np.unique(np.round(along, 9))[1:]:
+        raised = scene.mesh.rest_positions + np.where(np.abs(along - x) < 1e-6, 1.0, 0.0)[:, None] * (0, 0, 1)
+        columns.append(model.reduce(model.state(raised, still) - at_rest))
+    turned = model.reduce(model.state(scene.mesh.rest_positions, still + 1.0) - at_rest)
+    basis = np.array([*columns, *np.eye(model.free_size)[turned != 0.0]]).T
+    masses = model.free_weights(rest._values.masses)
+    inverses = scipy.linalg.eigh(
+        basis.T @ (masses[:, None] * basis), basis.T @ dense_stiffness(rest) @ basis, eigvals_only=True
+    )
+    return 1.0 / inverses[-1]
 
 
 def flaps(gap=4e-3, modulus=5e8, cells=(3, 1), far=0.0, force=None):
@@ -168,7 +167,7 @@ def test_frequencies_equal_those_of_a_dense_decomposition():
 @pytest.mark.usefixtures("dense")
 def test_modes_that_grow_are_counted_with_the_own_field():
     """Check a straight strip under twelve times its buckling load, and ask for fewer modes than grow."""
-    scene = strip(4e-3, (8, 2))
+    scene = strip(4e-3, (8, 2), length=20e-3)
     factor = ms.linear_buckling(scene, at_rest(scene), load_factor=1.0).factors[0]
     pressed = ms.equilibrium(
         scene,
