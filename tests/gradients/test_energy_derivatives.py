@@ -179,6 +179,33 @@ def test_support_factor_turns_the_directions_of_clamps():
     check_one_value(scene, positions, {"edge_rotations": rotations}, "support_factor", np.array(0.7))
 
 
+@pytest.mark.parametrize("of_single", [False, True], ids=["of the sum", "of one energy"])
+def test_second_derivatives_stay_those_of_their_values_after_another_solve(of_single):
+    """Check a clamp whose directions follow from values: those of the last use of the core were taken."""
+    sheet = ms.Shell(MESH, **RUBBER)
+    clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 0), rotation=(0, 0.1, 0))
+    scene = ms.Scene(sheet, supports=[clamp])
+    places = 1.01 * MESH.rest_positions
+
+    def second(thickness_too, other_solve):
+        positions, thickness = tensors(places, RUBBER["thickness"])
+        values = {clamp: {"rotation": (0, 0.5, 0)}, sheet: {"thickness": thickness}}
+        if of_single:
+            energy = ms.energies(scene, positions, values=values)["bending"]
+        else:
+            energy = ms.energy(scene, positions, values=values)
+        (gradient,) = torch.autograd.grad(energy, positions, create_graph=True)
+        if other_solve:
+            ms.energy(scene, places)
+        motion = torch.tensor(np.random.default_rng(0).standard_normal(places.shape))
+        by = [positions, thickness] if thickness_too else [positions]
+        return torch.autograd.grad((gradient * motion).sum(), by)
+
+    for thickness_too in (False, True):
+        for one, other in zip(second(thickness_too, False), second(thickness_too, True), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
 def test_volume_of_a_cavity_couples_all_vertices():
     """Check that the low-rank part of the core's Hessian is in the matrix."""
     box = ms.meshes.box((0.1, 0.1, 0.1), cells=(2, 2, 1))

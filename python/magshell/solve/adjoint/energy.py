@@ -79,7 +79,11 @@ class EnergyAdjoint:
     def __init__(self, function: str, inputs: Inputs, base: np.ndarray):
         self.inputs: Inputs = inputs
         self._function, self._base = function, base
-        self._model = inputs.scene._model
+
+    @property
+    def _model(self) -> _core.Model:
+        """The model of the core that this thread uses."""
+        return self.inputs.scene._model
 
     def with_inputs(self, inputs: Inputs, leaves: list[Leaf]) -> EnergyAdjoint:
         """Return the energies at the same state with other values. leaves: by which there are derivatives."""
@@ -87,7 +91,10 @@ class EnergyAdjoint:
         return EnergyAdjoint(self._function, inputs, self._base)
 
     def state(self, load_parameters: np.ndarray) -> np.ndarray:
-        """Return all unknowns. Positions do not determine the directions that clamps hold: the clamps prescribe these."""
+        """Return all unknowns; the core must hold the values.
+
+        Positions do not determine the directions that clamps hold: the clamps prescribe these.
+        """
         scene, state = self.inputs.scene, self._base.copy()
         first = 3 * scene._bodies.n_points
         directions = slice(first, first + 3 * len(scene._constraints.directions))
@@ -146,8 +153,9 @@ class EnergyAdjoint:
     @cached_property
     def hessian(self) -> scipy.sparse.csr_array:
         """The Hessian of the sum by all unknowns of the core, whole."""
-        state, load_parameters = self.state(self.inputs.load_parameters), self.inputs.load_parameters
+        load_parameters = self.inputs.load_parameters
         with self.inputs.in_core():
+            state = self.state(load_parameters)
             self._model.term_energies(state, [], load_parameters)
             size, starts, rows, values = self._model.hessian(state, load_parameters, reduced=False)
             columns, stiffnesses = self._model.low_rank(reduced=False)
@@ -229,8 +237,9 @@ class EnergyAdjoint:
 
     def _gradient_products(self, motion: np.ndarray) -> np.ndarray:
         """Return the products of a motion with the gradients of single energies, (n,)."""
-        state, load_parameters = self.state(self.inputs.load_parameters), self.inputs.load_parameters
+        load_parameters = self.inputs.load_parameters
         with self.inputs.in_core():
+            state = self.state(load_parameters)
             names = self._names(state, load_parameters)
             return np.array(
                 [motion @ self._model.term_gradient(name, state, load_parameters) for name in names]
@@ -238,11 +247,11 @@ class EnergyAdjoint:
 
     def _hessian_product(self, weights: np.ndarray, motion: np.ndarray) -> np.ndarray:
         """Return the rate of the gradient of the weighted sum along a motion. Raises NoGradient where it is not smooth."""
-        state, load_parameters = self.state(self.inputs.load_parameters), self.inputs.load_parameters
-        length = self._relative_size(motion)
+        load_parameters, length = self.inputs.load_parameters, self._relative_size(motion)
         if length == 0.0:
             return np.zeros_like(motion)
         with self.inputs.in_core():
+            state = self.state(load_parameters)
             rate = directional_derivative(
                 lambda step: self.weighted(weights, state + step * motion, load_parameters)[None],
                 [_STEP * shorter / length for shorter in _SHORTER],
@@ -267,8 +276,9 @@ class EnergyAdjoint:
         return any(leaf.owner is each for each in scene.supports) or bool(self._moved_by(leaf, False))
 
     def _by_values(self, motion: np.ndarray) -> Gradient:
-        inputs, state = self.inputs, self.state(self.inputs.load_parameters)
+        inputs = self.inputs
         with inputs.in_core():
+            state = self.state(inputs.load_parameters)
             self._model.term_energies(state, [], inputs.load_parameters)
             by_values = _core.vjp(self._model, state, inputs.load_parameters, motion)[0]
         return Gradient(inputs.scene, by_values, np.zeros_like(inputs.load_parameters))
