@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -51,6 +51,20 @@ def obstacle_state(
     return ObstacleState(variant(obstacle, motion=None), 0.0, np.zeros(3), np.zeros(3))
 
 
+class _NearPairs(NamedTuple):
+    """The pairs of a contact with obstacles that are nearer than its offset, a row for each, as in `ContactState`.
+
+    relative: (k, 3) m/s, the velocity of the first part seen from the obstacle.
+    """
+
+    pairs: np.ndarray
+    weights: np.ndarray
+    distances: np.ndarray
+    normals: np.ndarray
+    relative: np.ndarray
+    shape_pairs: np.ndarray
+
+
 def pairs_with_obstacles(
     scene: Scene,
     values: Any,
@@ -61,102 +75,102 @@ def pairs_with_obstacles(
 ) -> dict[str, np.ndarray]:
     """Return the contact pairs with obstacles in the arrays in which `_core.touching_pairs` returns pairs of bodies.
 
-    Each pair is a point of the body, a vertex or a sample point of a face, that is nearer than the offset to an obstacle.
+    Each pair is a point of the body, a vertex or a sample point of a face, or a shape, that is nearer than the offset to an
+    obstacle.
 
     all_points, velocities: of the vertices and of the points of rigid bodies, (n, 3). time: s; None in an equilibrium.
     """
-    if contact.shapes:
-        return _pairs_of_shapes(scene, values, contact, all_points, velocities, time)
+    law = values.current(contact)._law(*values.contact_bodies(contact))
+    stiffness, smoothing, offset, coefficient, sticking_speed = law
+    find = _near_shapes if contact.shapes else _near_points
+    none = _NearPairs(
+        np.zeros((0, 4), dtype=np.int64),
+        np.zeros((0, 4)),
+        np.zeros(0),
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+        np.zeros((0, 2), dtype=np.int64),
+    )
+    parts = [none, *find(scene, values, contact, offset, all_points, velocities, time)]
+    near = _NearPairs(*map(np.concatenate, zip(*parts, strict=True)))
+    forces = stiffness * _smoothed_depth(offset - near.distances, smoothing)
+    sliding = near.relative - np.sum(near.relative * near.normals, axis=1)[:, None] * near.normals
+    return {
+        "pairs": near.pairs,
+        "distances": near.distances,
+        "normals": near.normals,
+        "normal_forces": forces,
+        "friction_forces": -coefficient * forces[:, None] * _per_speed(sliding, sticking_speed) * sliding,
+        "sliding_velocities": sliding,
+        "weights": near.weights,
+        "forces": near.weights[:, :, None] * (forces[:, None] * near.normals)[:, None, :],
+        "swapped": np.zeros(len(near.distances), dtype=bool),
+        "shape_pairs": near.shape_pairs,
+    }
+
+
+def _near_points(
+    scene: Scene,
+    values: Any,
+    contact: Contact,
+    offset: float,
+    all_points: np.ndarray,
+    velocities: np.ndarray,
+    time: float | None,
+) -> Iterator[_NearPairs]:
+    """Yield the points of the body that are nearer than the offset to each obstacle."""
     vertices, weights = contact_points(scene._bodies, contact)
-    numbers = values.current(contact)._law(*values.contact_bodies(contact))
-    offset = numbers[2]
     corners = np.where(weights != 0.0, vertices, 0)
     points = np.einsum("pk,pkc->pc", weights, all_points[corners])
     point_velocities = np.einsum("pk,pkc->pc", weights, velocities[corners])
-    found: dict[str, list[np.ndarray]] = {}
     for each in contact.obstacles:
         body = obstacle_state(scene, values.current(each), time, all_points, velocities)
         distances = body.obstacle.signed_distance(points, body.time)
         active = np.flatnonzero(distances < offset)
         at = points[active]
-        normals = body.obstacle.normals(at, body.time)
         pairs = np.where(weights[active] != 0.0, vertices[active], -1)
-        rows = _with_forces(
-            numbers,
+        yield _NearPairs(
             np.pad(pairs, ((0, 0), (0, 1)), constant_values=-1),
             np.pad(weights[active], ((0, 0), (0, 1))),
             distances[active],
-            normals,
+            body.obstacle.normals(at, body.time),
             point_velocities[active] - body.velocities(at),
+            np.zeros((0, 2), dtype=np.int64),
         )
-        for name, each in rows.items():
-            found.setdefault(name, []).append(each)
-    return {name: np.concatenate(each) for name, each in found.items()}
 
 
-def _pairs_of_shapes(
+def _near_shapes(
     scene: Scene,
     values: Any,
     contact: Contact,
+    offset: float,
     all_points: np.ndarray,
     velocities: np.ndarray,
     time: float | None,
-) -> dict[str, np.ndarray]:
-    """Return the pairs of shapes and obstacles that touch, as `pairs_with_obstacles` does."""
-    numbers = values.current(contact)._law()
-    normals, distances, relative, shapes = [], [], [], []
+) -> Iterator[_NearPairs]:
+    """Yield the shapes that are nearer than the offset to an obstacle, one by one."""
     for pair in contact._rounds:
         shape, obstacle = (
             obstacle_state(scene, values.current(each), time, all_points, velocities)
             for each in (pair.shape, pair.obstacle)
         )
         near = gap(pair, shape.obstacle, obstacle.obstacle, obstacle.time)
-        if near.distance >= numbers[2]:
+        if near.distance >= offset:
             continue
-        normals.append(near.normal)
-        distances.append(near.distance)
-        relative.append(shape.velocities(near.point) - obstacle.velocities(near.point))
-        shapes.append((_index(contact.shapes, pair.shape), _index(contact.obstacles, pair.obstacle)))
-    count = len(distances)
-    found = _with_forces(
-        numbers,
-        np.full((count, 4), -1),
-        np.zeros((count, 4)),
-        np.array(distances),
-        np.reshape(normals, (count, 3)),
-        np.reshape(relative, (count, 3)),
-    )
-    return {**found, "shape_pairs": np.reshape(shapes, (count, 2)).astype(np.int64)}
+        relative = shape.velocities(near.point) - obstacle.velocities(near.point)
+        numbers = [_index(contact.shapes, pair.shape), _index(contact.obstacles, pair.obstacle)]
+        yield _NearPairs(
+            np.full((1, 4), -1),
+            np.zeros((1, 4)),
+            np.array([near.distance]),
+            np.reshape(near.normal, (1, 3)),
+            np.reshape(relative, (1, 3)),
+            np.array([numbers]),
+        )
 
 
 def _index(objects: Sequence[Any], wanted: Any) -> int:
     return next(k for k, each in enumerate(objects) if each is wanted)
-
-
-def _with_forces(
-    law: tuple[float, ...],
-    pairs: np.ndarray,
-    weights: np.ndarray,
-    distances: np.ndarray,
-    normals: np.ndarray,
-    relative: np.ndarray,
-) -> dict[str, np.ndarray]:
-    """Return the arrays of pairs in contact, with the forces of a contact's law at their relative velocities, (k, 3)
-    m/s."""
-    stiffness, smoothing, offset, coefficient, sticking_speed = law
-    forces = stiffness * _smoothed_depth(offset - distances, smoothing)
-    sliding = relative - np.sum(relative * normals, axis=1)[:, None] * normals
-    return {
-        "pairs": pairs,
-        "distances": distances,
-        "normals": normals,
-        "normal_forces": forces,
-        "friction_forces": -coefficient * forces[:, None] * _per_speed(sliding, sticking_speed) * sliding,
-        "sliding_velocities": sliding,
-        "weights": weights,
-        "forces": weights[:, :, None] * (forces[:, None] * normals)[:, None, :],
-        "swapped": np.zeros(len(distances), dtype=bool),
-    }
 
 
 def _smoothed_depth(depth: np.ndarray, smoothing: float) -> np.ndarray:
