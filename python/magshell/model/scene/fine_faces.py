@@ -17,6 +17,7 @@ import numpy as np
 
 from ..._input.quantity import quantity
 from ..fields.field import UniformField
+from .element_sampling import FAR_EDGES
 from .field_sampling import KEY, TRUSTED, SamplingError, is_suspect, sampling_errors
 
 if TYPE_CHECKING:
@@ -30,10 +31,6 @@ _LEFT = 0.0002
 # [-] Errors of faces closer to each other than this ratio count as equal, so that of two faces that mirror each other both
 # sample finely, or none; fixed by test_hard_case_reaches_its_answer, a strip close to a dipole
 _EQUAL = 1.0 - 1e-6
-# Distance d from sources, over the longest edge a, beyond which no estimate is made before a solve: the mean of a dipole's
-# force over a face is that at its barycenter to (a/d)^2 10/18, 0.9 % here; fixed by
-# test_no_face_beyond_eight_edges_from_a_dipole_samples_finely
-_FAR = 8.0
 
 
 def keeping_fine_faces(inputs: Inputs, before: Values) -> Inputs:
@@ -132,7 +129,7 @@ def _is_far(values: Values, state: np.ndarray) -> bool:
         if sphere is None:
             return False
         center, radius = sphere
-        if not np.linalg.norm(positions - center, axis=1).min() - radius > _FAR * size:
+        if not np.linalg.norm(positions - center, axis=1).min() - radius > FAR_EDGES * size:
             return False
     return True
 
