@@ -190,3 +190,25 @@ def test_a_point_mass_on_a_hinge_through_its_center_is_still_refused():
         ValueError, match=r"does not let it turn \(Prismatic, Fixed\): nothing tells how it turns"
     ):
         ms.Scene(ms.Skeleton([mass], [ms.Revolute(mass, origin=(0, 0, 0), axis=(1, 0, 0))]))
+
+
+def test_a_motion_as_start_of_a_static_solve_is_refused_with_advice():
+    mesh = ms.meshes.rectangle(0.04, 0.02, cells=(4, 2))
+    body = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    scene = ms.Scene(body, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    motion = ms.simulate(scene, steps=1, time_step=1e-3)
+    with pytest.raises(
+        TypeError, match=r"Equilibrium or positions, got Trajectory: .* motion.positions\[-1\]"
+    ):
+        ms.equilibrium(scene, start=motion)
+    assert ms.equilibrium(scene, start=motion.positions[-1]).stable
+
+
+def test_an_object_as_index_of_a_batch_of_motions_is_refused_with_advice():
+    mesh = ms.meshes.rectangle(0.04, 0.02, cells=(4, 2))
+    body = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    scene = ms.Scene(body, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    batch = ms.simulate(scene, steps=1, time_step=1e-3, batch=3, gravity_factor=[0.5, 1.0, 1.5])
+    with pytest.raises(TypeError, match=r"takes the number of a member, got Shell; batch\[k\]"):
+        batch[body]
+    assert batch[np.int64(2)] is batch[-1]

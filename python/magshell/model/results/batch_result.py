@@ -32,6 +32,11 @@ class BatchResult:
 
     def _member(self, index: int) -> Any:
         """Return the result of one member, or raise the error that it ended with."""
+        if isinstance(index, bool) or not isinstance(index, int | np.integer):
+            raise TypeError(
+                f"{type(self).__name__} takes the number of a member, got {type(index).__name__}; batch[k] has the results "
+                "of objects in member k"
+            )
         member = range(len(self))[index]  # raises IndexError
         if member in self.failed:
             raise self.failed[member]

@@ -49,6 +49,11 @@ def starting_point(
             start._load_parameters,
             start._values.same_as(inputs.values),
         )
+    if hasattr(start, "scene"):
+        raise TypeError(
+            f"start must be an Equilibrium or positions, got {type(start).__name__}: hand over the positions of one of its "
+            "states, such as motion.positions[-1] of a Trajectory"
+        )
     positions = quantity("start", "m", to_array("start", start), ("n_v", 3))
     n_v = scene.mesh.n_vertices
     if len(positions) != n_v:
