@@ -10,8 +10,10 @@ import magshell as ms
 
 torch = pytest.importorskip("torch")
 
-from magshell.design.optim.least_squares import DenseModel  # noqa: E402
-from magshell.design.optim.least_squares_products import ProductModel  # noqa: E402
+from magshell.design.optim.gauss_newton import (  # noqa: E402
+    DenseModel,
+    ProductModel,
+)
 
 HOWS = ("forward", "backward", "products")
 

@@ -18,9 +18,10 @@ from ..model.scene.scene import Scene
 from ..solve.options import MixedNewton, Newton
 from ..solve.statics.batch import find_along, from_starts
 from ..solve.statics.single_solve import Search
-from .library import require_double_precision, require_jax
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from ..solve.adjoint.batch import BatchAdjoint
 
 _KEPT = 4  # solves of which the factorizations are kept; fixed by test_gradients_repeat_no_solve
@@ -223,3 +224,21 @@ class _Solves:
 def _key(numbers: list[np.ndarray]) -> bytes:
     """Return the bytes of all numbers, by which a solve is found again."""
     return b"".join(np.ascontiguousarray(each).tobytes() for each in numbers)
+
+
+def require_jax(what: str) -> ModuleType:
+    """Return the jax module. Raises ImportError with the command that installs it; what: the feature that needs it."""
+    try:
+        import jax
+    except ImportError as error:
+        raise ImportError(f'{what} needs jax: pip install "magshell[jax]"') from error
+    return jax
+
+
+def require_double_precision(jax: ModuleType, what: str) -> None:
+    """Raise RuntimeError with the remedy if JAX computes in single precision."""
+    if not jax.config.jax_enable_x64:
+        raise RuntimeError(
+            f'{what} needs double precision, which JAX leaves off by default: jax.config.update("jax_enable_x64", '
+            "True) before the first array is made"
+        )

@@ -1,4 +1,4 @@
-"""Finer meshes of the same sheet: of second order, divided, or bisected, and how they descend from the coarse mesh."""
+"""Finer meshes of a sheet or solid: of second order, divided, or bisected, and how they descend from the coarse mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ import scipy
 
 from .groups import row_numbers
 from .off_surface import curved_edges
-from .triangles.bisection import bisected_edges, divided_faces
+from .tetrahedra.jacobian import shape_values
+from .tetrahedra.refine import BARYCENTRIC, CHILDREN
+from .tetrahedra.tet_mesh import TetMesh
+from .topology import EDGES, FACES
 from .triangles.six_node_checks import inner_weights, weights_between
 from .triangles.six_node_mesh import QuadraticTriangleMesh, projected
 from .triangles.smooth_fit import middles_on_fit
@@ -71,7 +74,15 @@ def second_order(mesh: TriangleMesh, project: Project | None, planes: Any = ()) 
     of_edges = row_numbers(mesh.edges, fine.edges)
     means = interpolation_rows(mesh.n_vertices, mesh.edges, np.full(mesh.edges.shape, 0.5))
     inside = np.full(mesh.n_edges, -1)
-    return FinerMesh(mesh, fine, np.arange(mesh.n_faces), of_edges, edges, inside, means)
+    return FinerMesh(
+        mesh,
+        fine,
+        element_parents=np.arange(mesh.n_faces),
+        edge_parents=of_edges,
+        new_edges=edges,
+        new_elements=inside,
+        interpolation=means,
+    )
 
 
 def divided(mesh: QuadraticTriangleMesh, project: Project | None) -> FinerMesh:
@@ -90,10 +101,15 @@ def divided(mesh: QuadraticTriangleMesh, project: Project | None) -> FinerMesh:
     inner = np.tile(inner_weights(), (mesh.n_elements, 1))
     inside = interpolation_rows(mesh.n_vertices, np.repeat(mesh.elements, 3, axis=0), inner)
     inside = inside[mesh.n_vertices :]
-    parents = np.where(of_halves < 0, -1, of_halves // 2)
-    interpolation = scipy.sparse.vstack([weights, inside]).tocsr()
-    new_elements = np.concatenate([np.full(len(on_edges), -1), np.repeat(n, 3)])
-    return FinerMesh(mesh, fine, np.repeat(n, 4), parents, new_edges, new_elements, interpolation)
+    return FinerMesh(
+        mesh,
+        fine,
+        element_parents=np.repeat(n, 4),
+        edge_parents=np.where(of_halves < 0, -1, of_halves // 2),
+        new_edges=new_edges,
+        new_elements=np.concatenate([np.full(len(on_edges), -1), np.repeat(n, 3)]),
+        interpolation=scipy.sparse.vstack([weights, inside]).tocsr(),
+    )
 
 
 def bisected(mesh: Sheet, marked: np.ndarray, project: Project | None, planes: Any = ()) -> FinerMesh:
@@ -114,9 +130,15 @@ def bisected(mesh: Sheet, marked: np.ndarray, project: Project | None, planes: A
     fine = fine._with_members(_groups(mesh, split_edges, new, fine, parents))
     ends = mesh.edges[split_edges]
     means = interpolation_rows(mesh.n_vertices, ends, np.full(ends.shape, 0.5))
-    inside = np.full(len(split_edges), -1)
-    of_edges = _edge_parents(mesh, split_edges, new, fine)
-    return FinerMesh(mesh, fine, parents, of_edges, split_edges, inside, means)
+    return FinerMesh(
+        mesh,
+        fine,
+        element_parents=parents,
+        edge_parents=_edge_parents(mesh, split_edges, new, fine),
+        new_edges=split_edges,
+        new_elements=np.full(len(split_edges), -1),
+        interpolation=means,
+    )
 
 
 def _bisected_six(mesh: QuadraticTriangleMesh, marked: np.ndarray, project: Project | None) -> FinerMesh:
@@ -149,9 +171,15 @@ def _bisected_six(mesh: QuadraticTriangleMesh, marked: np.ndarray, project: Proj
     new[split_edges] = middle
     fine = fine._with_members(_groups(mesh, split_edges, new, fine, parents))
     on_edge = np.where(half < 0, -1, split_edges[half // 2])[is_new]
-    inside = np.where(on_edge < 0, owners[is_new], -1)
-    of_edges = _edge_parents(mesh, split_edges, new, fine)
-    return FinerMesh(mesh, fine, parents, of_edges, on_edge, inside, interpolation)
+    return FinerMesh(
+        mesh,
+        fine,
+        element_parents=parents,
+        edge_parents=_edge_parents(mesh, split_edges, new, fine),
+        new_edges=on_edge,
+        new_elements=np.where(on_edge < 0, owners[is_new], -1),
+        interpolation=interpolation,
+    )
 
 
 def _edge_parents(mesh: Sheet, split_edges: np.ndarray, new: np.ndarray, fine: Sheet) -> np.ndarray:
@@ -226,3 +254,122 @@ def _groups(
     if found:
         mesh._warn_of_new_vertices()
     return found
+
+
+def bisected_edges(mesh: TriangleMesh, marked: np.ndarray) -> np.ndarray:
+    """Return the edges to be divided so that the marked faces, (k,), are divided and the mesh stays conforming, ascending.
+
+    They are all edges of marked faces, and the longest edge of every face that has another divided edge.
+    """
+    face_edges = mesh.face_edges
+    longest = face_edges[np.arange(mesh.n_faces), longest_sides(mesh)]
+    split_edges = np.zeros(mesh.n_edges, dtype=bool)
+    split_edges[face_edges[marked]] = True
+    while True:
+        reached = longest[split_edges[face_edges].any(axis=1)]
+        if split_edges[reached].all():
+            return np.flatnonzero(split_edges)
+        split_edges[reached] = True
+
+
+def longest_sides(mesh: TriangleMesh) -> np.ndarray:
+    """Return the corner opposite the longest edge of each face, (n_f,); of equally long edges that with the largest number.
+
+    The order of edges makes the choice the same in both faces of an edge, so that the chain of longest edges ends.
+    """
+    lengths = mesh.edge_lengths[mesh.face_edges]
+    near = lengths >= (1.0 - 1e-9) * lengths.max(axis=1, keepdims=True)
+    return np.where(near, mesh.face_edges, -1).argmax(axis=1)
+
+
+def divided_faces(mesh: TriangleMesh, split_edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the faces (m, 3) of the mesh with these edges divided, and the face that each lies in, (m,).
+
+    The middle of the k-th of these edges is vertex n_v + k. Faces keep their orientation; the parts of a face follow
+    each other.
+    """
+    middle = np.full(mesh.n_edges, -1)
+    middle[split_edges] = mesh.n_vertices + np.arange(len(split_edges))
+    turn = (longest_sides(mesh)[:, None] + np.arange(3)) % 3  # the corner opposite the longest edge first
+    rows = np.arange(mesh.n_faces)[:, None]
+    a, b, c = mesh.faces[rows, turn].T.astype(np.int64)
+    of_a, of_b, of_c = middle[mesh.face_edges[rows, turn]].T
+    whole = of_a < 0
+    number = np.arange(mesh.n_faces)
+    at_b, at_c = ~whole & (of_b >= 0), ~whole & (of_c >= 0)
+    parts = [
+        (whole, (a, b, c)),
+        (~whole & ~at_c, (a, b, of_a)),
+        (at_c, (of_a, a, of_c)),
+        (at_c, (of_a, of_c, b)),
+        (~whole & ~at_b, (a, of_a, c)),
+        (at_b, (of_a, c, of_b)),
+        (at_b, (of_a, of_b, a)),
+    ]
+    faces = np.concatenate([np.stack(corners, axis=1)[here] for here, corners in parts])
+    parents = np.concatenate([number[here] for here, _ in parts])
+    order = np.argsort(parents, kind="stable")
+    return faces[order].astype(np.int32), parents[order]
+
+
+def finer_solid(mesh: TetMesh) -> FinerMesh:
+    """Return the mesh of ten-node tetrahedra on the same four-node ones, or with each ten-node one divided into eight."""
+    return _second_order(mesh) if mesh.order == 1 else _divided(mesh)
+
+
+def _second_order(mesh: TetMesh) -> FinerMesh:
+    edges, elsewhere = np.arange(mesh.n_edges), np.full(mesh.n_edges, -1)
+    means = interpolation_rows(mesh.n_vertices, mesh.edges, np.full(mesh.edges.shape, 0.5))
+    return FinerMesh(
+        mesh,
+        mesh._with_members({}).second_order(),
+        element_parents=np.arange(mesh.n_tetrahedra),
+        edge_parents=edges,
+        new_edges=edges,
+        new_elements=elsewhere,
+        interpolation=means,
+        new_sides=elsewhere,
+        side_parents=np.arange(len(mesh.faces_of_corners)),
+    )
+
+
+def _divided(mesh: TetMesh) -> FinerMesh:
+    """Return the mesh divided into eight; the midside node of each new edge is in the order of the new edges."""
+    fine = mesh._with_members({}).refined()
+    # Barycentric coordinates in the parent of the middle of each edge of each child, for the first child that has it.
+    first = np.unique(fine.tetrahedron_edges.ravel(), return_index=True)[1]
+    middles = 0.5 * (BARYCENTRIC[CHILDREN[:, EDGES[:, 0]]] + BARYCENTRIC[CHILDREN[:, EDGES[:, 1]]])
+    middle = np.tile(middles.reshape(-1, 4), (mesh.n_tetrahedra, 1))[first]
+    parent = first // (8 * len(EDGES))
+    inside = middle > 0.0
+    count = inside.sum(axis=1)
+    new_edges, new_sides, new_elements = (np.full(len(first), -1) for _ in range(3))
+    for k, ends in enumerate(EDGES):
+        here = (count == 2) & inside[:, ends].all(axis=1)
+        new_edges[here] = mesh.tetrahedron_edges[parent[here], k]
+    on_side = count == 3
+    new_sides[on_side] = _outer_side(mesh, 4 * parent[on_side] + (~inside[on_side]).argmax(axis=1))
+    new_elements[(new_edges < 0) & (new_sides < 0)] = parent[(new_edges < 0) & (new_sides < 0)]
+    weights = interpolation_rows(mesh.n_vertices, mesh.tetrahedra[parent], shape_values(middle))
+    child, face = np.divmod(fine._outer, 4)
+    corners = BARYCENTRIC[CHILDREN[child % 8][np.arange(len(child))[:, None], FACES[face]]]
+    opposite = (
+        (corners == 0.0).all(axis=1).argmax(axis=1)
+    )  # the parent's corner that its side lies opposite to
+    return FinerMesh(
+        mesh,
+        fine,
+        element_parents=np.repeat(np.arange(mesh.n_tetrahedra), 8),
+        edge_parents=new_edges,
+        new_edges=new_edges,
+        new_elements=new_elements,
+        interpolation=weights,
+        new_sides=new_sides,
+        side_parents=_outer_side(mesh, 4 * (child // 8) + opposite),
+    )
+
+
+def _outer_side(mesh: TetMesh, faces: np.ndarray) -> np.ndarray:
+    """Return the number among the outer sides of faces 4 t + i of tetrahedra, -1 for inner ones."""
+    place = np.minimum(np.searchsorted(mesh._outer, faces), len(mesh._outer) - 1)
+    return np.where(mesh._outer[place] == faces, place, -1)

@@ -8,10 +8,9 @@ import magshell as ms
 pytest.importorskip("matplotlib")
 
 from magshell.output.plot.frames import Scenery
-from magshell.output.plot.panels import Options
+from magshell.output.plot.panels import Options, thick_skins
 from magshell.output.plot.surfaces import on_surfaces
 from magshell.output.plot.surroundings import obstacle_solids
-from magshell.output.plot.thick import thick_skins
 from magshell.output.plot.view import view_of
 from magshell.output.results.state import states_of
 from magshell.output.results.units import length_unit

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
-from magshell.mesh.finer_solid import finer_solid
+from magshell.mesh.finer import finer_solid
 from magshell.model.scene.finer_scene import finer_scene, held_vertices
 
 torch = pytest.importorskip("torch")

@@ -4,7 +4,7 @@ import pytest
 
 import magshell as ms
 from benchmarks.statics import oblique_field
-from magshell.solve.statics.load_strain import strain_of_loads
+from magshell.solve.statics.diagnosis import strain_of_loads
 from magshell.solve.statics.single_solve import inputs_of
 
 

@@ -8,10 +8,8 @@ out of the sheet, and its values for a solve.
 from __future__ import annotations
 
 from .filters import ConeFilter, HelmholtzFilter
-from .interpolation import interpolated
-from .matter import Matter
+from .matter import Matter, fixed, interpolated
 from .measures import perimeter, volume_fraction
-from .passive import fixed
 from .projection import RobustDensities, projected, robust
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""The faces of a sheet that are matter, as a mesh to solve with."""
+"""The faces of a sheet that are matter, as a mesh to solve with; its material between void and solid, and passive faces."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from ..._input.arrays import number
+from ..._input.arrays import index_array, number
 from ..._input.quantity import quantity
+from ..._input.scalars import positive
 from ..._input.tensors import detached, real_tensor, require_torch
 from ..._runtime.frozen import Frozen
 from ...mesh.connected import connected_groups
@@ -16,8 +17,6 @@ from ...mesh.groups import renumbered
 from ...mesh.triangles.fans import corner_vertices, opened
 from ...mesh.triangles.triangle_mesh import TriangleMesh, checked_mesh
 from .cells import cells_of, checked_density, laplacian
-from .interpolation import fraction, interpolated
-from .passive import faces_among
 
 if TYPE_CHECKING:
     import torch
@@ -204,3 +203,72 @@ def _part_of_mesh(mesh: TriangleMesh, faces: np.ndarray) -> tuple[TriangleMesh, 
     made = made._with_members(made._existing(renumbered(mesh._groups, numbers)))
     made, origin = opened(made, corner_vertices(made, made.interior_edges))
     return made, used[origin]
+
+
+def interpolated(
+    density: Numbers, full: Numbers, *, void: float = 0.0, power: float = 3.0, least_density: float = 0.0
+) -> torch.Tensor:
+    """Return a property of every face between void and solid: full (v + (1 - v) s^p), s = (d - m) / (1 - m), 0 below m.
+
+    It is the modified SIMP law (O. Sigmund, Morphology-based black and white filters for topology optimization, Struct.
+    Multidisc. Optim. 33, 2007), with a density m at which the void begins. A power above 1 makes densities between 0 and 1
+    inefficient.
+
+    density d: (n_f,) in [0, 1]. full: the property at density 1, a number, (n_f,), or vectors (3,) or (n_f, 3), in any unit.
+    void v: the fraction of it that void has, in [0, 1). power p: at least 1. least_density m: in [0, 1).
+
+    >>> import magshell as ms
+    >>> ms.parametrize.density.interpolated([0.0, 0.5, 1.0], 1e6, void=1e-3)
+    tensor([   1000.0000,  125875.0000, 1000000.0000], dtype=torch.float64)
+    """
+    density = checked_density("density", density, "n_f")
+    full = real_tensor("full", full, ("...",)).to(density)
+    if tuple(full.shape) not in ((), (len(density),), (3,), (len(density), 3)):
+        raise ValueError(
+            f"full must be a number or have shape (n_f,) = ({len(density)},), (3,) or ({len(density)}, 3), got "
+            f"{tuple(full.shape)}"
+        )
+    void, least = fraction("void", void), fraction("least_density", least_density)
+    power = positive("power", "1", power)
+    if power < 1.0:
+        raise ValueError(f"power [1] must be at least 1, got {power:g}")
+    share = void + (1.0 - void) * ((density - least) / (1.0 - least)).clamp(min=0.0) ** power
+    vectors = full.ndim == 2 or (full.ndim == 1 and len(full) == 3 and len(density) != 3)
+    return full * (share[:, None] if vectors else share)
+
+
+def fraction(name: str, value: float) -> float:
+    """Return a number in [0, 1). Raises ValueError for any other."""
+    given = number(f"{name} [1]", detached(value))
+    if not 0.0 <= given < 1.0:
+        raise ValueError(f"{name} [1] must be 0 or more and below 1, got {given:g}")
+    return given
+
+
+def fixed(density: Numbers, solid: Numbers = (), void: Numbers = ()) -> torch.Tensor:
+    """Return the densities (n_f,), with 1 on some faces, and 0 on others.
+
+    Apply it last, after filter and projection, to faces that supports, loads and other parts need.
+
+    density: (n_f,) in [0, 1]. solid, void: indices of faces.
+
+    >>> import magshell as ms
+    >>> ms.parametrize.density.fixed([0.5, 0.5, 0.5], solid=[0], void=[2])
+    tensor([1.0000, 0.5000, 0.0000], dtype=torch.float64)
+    """
+    torch = require_torch("parametrize.density.fixed")
+    density = checked_density("density", density, "n_f")
+    full, empty = (faces_among(name, each, len(density)) for name, each in (("solid", solid), ("void", void)))
+    both = np.intersect1d(full, empty)
+    if len(both):
+        raise ValueError(f"face {both[0]} is among the solid and the void faces")
+    return density.index_fill(0, torch.tensor(full), 1.0).index_fill(0, torch.tensor(empty), 0.0)
+
+
+def faces_among(name: str, faces: Any, count: int) -> np.ndarray:
+    """Return distinct indices of faces, ascending. Raises ValueError for those that are out of range."""
+    chosen = np.unique(index_array(name, faces).ravel())
+    if len(chosen) and not 0 <= chosen[0] <= chosen[-1] < count:
+        wrong = chosen[0] if chosen[0] < 0 else chosen[-1]
+        raise ValueError(f"{name} names face {wrong}, but they are numbered 0 to {count - 1}")
+    return chosen

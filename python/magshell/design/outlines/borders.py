@@ -10,13 +10,15 @@ import numpy as np
 from ..._input.quantity import quantity
 from ..._input.tensors import detached
 from ..._runtime.frozen import Frozen
-from .splines import LEAST_CONTROLS, closed_spline
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
 _SAMPLES = 16  # points of a span of a spline, from which its length is estimated
 LEAST_CHORDS = 12  # of a circle
+
+
+LEAST_CONTROLS = 4  # control points of a closed cubic spline
 
 
 class Border(Frozen, ABC):
@@ -155,3 +157,15 @@ def _of_points(weights: np.ndarray) -> np.ndarray:
     """Return weights (n, k) of control points as a map of their coordinates, (n, 2, 2 k)."""
     n, k = weights.shape
     return np.einsum("nk,ij->nikj", weights, np.eye(2)).reshape(n, 2, 2 * k)
+
+
+def closed_spline(at: np.ndarray, count: int) -> np.ndarray:
+    """Return the closed uniform cubic B-splines of `count` control points at parameters (n,) in [0, count), (n, count)."""
+    first, t = np.floor(at).astype(int), at - np.floor(at)
+    weights = np.stack(
+        [(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3], axis=1
+    )
+    splines = np.zeros((len(at), count))
+    for k in range(4):
+        np.add.at(splines, (np.arange(len(at)), (first + k - 1) % count), weights[:, k] / 6.0)
+    return splines

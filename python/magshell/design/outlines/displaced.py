@@ -8,8 +8,8 @@ import numpy as np
 
 from ..._input.tensors import real_tensor, require_torch
 from ...mesh.triangles.triangle_mesh import TriangleMesh, checked_mesh
+from .borders import LEAST_CONTROLS, closed_spline
 from .following import with_boundary
-from .splines import LEAST_CONTROLS, closed_spline
 
 if TYPE_CHECKING:
     import torch

@@ -2,12 +2,10 @@
 
 from .balls import ball
 from .boxes import box
-from .cuts import cut
-from .disks import disk
 from .extrusions import extruded, solid_cylinder
 from .filled import tetrahedralize
-from .outlines import outline
-from .rectangles import rectangle
+from .flat import disk, rectangle
+from .outlines import cut, outline
 from .stuffed import from_distance
 from .surfaces_of_revolution import annulus, cylinder, sector, spherical_cap
 from .tubes import tube

@@ -14,7 +14,7 @@ from ..tetrahedra.tet_mesh import TetMesh
 from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
 from ._round import round_order
 from ._tet_cells import check_order, check_size, checked_cells, oriented, prisms
-from .disks import disk
+from .flat import disk
 
 _FLAT = 1e-9  # [-] largest range of z of a flat mesh, relative to the diagonal of its bounding box
 

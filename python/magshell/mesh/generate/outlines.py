@@ -1,4 +1,4 @@
-"""The generator of flat meshes inside any polygon, with holes and slits, meshed by gmsh."""
+"""The generator of flat meshes inside any polygon, with holes and slits, meshed by gmsh; and cuts along slits."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.arrays import index_array
 from ..._input.checked_list import listed
 from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
-from ..triangles.triangle_mesh import TriangleMesh
+from ..triangles.fans import corner_vertices, corners_at, opened
+from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
 from ._gmsh_session import gmsh_session
 from ._grid import check_size
 from ._six_nodes import check_order, sheet_of_order
-from .cuts import cut
 from .polygon import (
     checked_polygon,
     checked_polyline,
@@ -210,3 +211,45 @@ def _check_slits_open(mesh: TriangleMesh, slit_sides: list[np.ndarray]) -> None:
                 f"slit {k} is a single edge of the mesh and does not open; "
                 "choose a size below half its length"
             )
+
+
+@grouped()
+def cut(mesh: TriangleMesh, edges: Numbers) -> TriangleMesh:
+    """Cut a mesh along interior edges, so that the two sides of the cut get separate vertices.
+
+    The ends of a cut stay joined unless they lie on the boundary or on another cut, so a slit needs at least
+    two edges to open. Faces keep their numbers. Vertices on one side of the cut keep their numbers, those on the other side
+    are appended at the end.
+
+    Args:
+        mesh: the mesh to cut; it is not changed.
+        edges: indices of interior edges.
+
+    Raises:
+        ValueError: for an edge that is out of range, on the boundary, or does not open.
+
+    >>> import magshell as ms
+    >>> sheet = ms.meshes.rectangle(4.0, 2.0, cells=(4, 2))
+    >>> slit = sheet.edges_where(lambda p: (p[:, 1] == 1.0) & (abs(p[:, 0] - 2.0) < 1.0))
+    >>> len(ms.meshes.cut(sheet, slit).boundary_loops)
+    2
+    """
+    checked_mesh(mesh)
+    edges = np.unique(index_array("edges", edges))
+    outside = edges[(edges < 0) | (edges >= mesh.n_edges)]
+    if len(outside):
+        raise ValueError(f"edges names edge {outside[0]}, but they are numbered 0 to {mesh.n_edges - 1}")
+    on_boundary = np.intersect1d(edges, mesh.boundary_edges)
+    if len(on_boundary):
+        raise ValueError(f"edge {on_boundary[0]} is on the boundary: there is nothing to cut")
+
+    corner_vertex = corner_vertices(mesh, np.setdiff1d(mesh.interior_edges, edges))
+    lows, highs = corners_at(mesh, edges)
+    low_joined, high_joined = (corner_vertex[c[:, 0]] == corner_vertex[c[:, 1]] for c in (lows, highs))
+    closed = edges[low_joined & high_joined]
+    if len(closed):
+        raise ValueError(
+            f"a cut along edge {closed[0]} alone does not open, because both its ends stay joined; "
+            "cut at least two edges in a row, or refine the mesh"
+        )
+    return opened(mesh, corner_vertex)[0]

@@ -7,7 +7,6 @@ import numpy as np
 from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
 from ..tetrahedra.tet_mesh import TetMesh
-from ._angles import TURN, angle_span, is_full_circle
 from ._round import round_order
 from ._tet_cells import (
     check_diagonals,
@@ -18,6 +17,7 @@ from ._tet_cells import (
     six_each,
     twenty_four_each,
 )
+from .surfaces_of_revolution import TURN, angle_span, is_full_circle
 
 
 @grouped()

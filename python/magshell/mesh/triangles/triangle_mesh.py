@@ -13,14 +13,16 @@ from ..._input.quantity import quantity
 from ..._input.scalars import positive
 from ..connected import connected_groups
 from ..mesh_base import MeshBase, frozen
-from ..signed_distance import Distance
+from ..signed_distance import Distance, middles_on_surface
 from ..transforms import moved
 from .face_quality import MeshQuality
-from .refine import refined
-from .summary import boundary_loops, summary
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers, Rotates
+
+
+# nodes of a face: 0 to 2 are its corners, 3 to 5 the midpoints of the edges opposite to them
+_CHILDREN = np.array([(0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5)])
 
 
 class TriangleMesh(MeshBase):
@@ -237,3 +239,75 @@ def checked_mesh(value: Any, name: str = "mesh") -> TriangleMesh:
     if not isinstance(value, TriangleMesh):
         raise ValueError(f"{name} must be a TriangleMesh, got {type(value).__name__}")
     return value
+
+
+def refined(mesh: TriangleMesh, surface: Distance | None) -> TriangleMesh:
+    """Return the refined mesh, in which face f becomes the faces 4 f to 4 f + 3.
+
+    Vertices keep their numbers, and the midpoint of edge k is vertex n_v + k. surface: a signed distance onto whose zeros
+    midpoints are moved, or None.
+    """
+    middles = mesh.edge_midpoints
+    if surface is not None:
+        edges, on_it = middles_on_surface(mesh, np.arange(mesh.n_edges), surface)
+        middles = middles.copy()
+        middles[edges] = on_it
+    nodes = np.concatenate([mesh.faces, mesh.n_vertices + mesh.face_edges], axis=1)
+    fine = type(mesh)(np.concatenate([mesh.rest_positions, middles]), nodes[:, _CHILDREN].reshape(-1, 3))
+    return fine._with_members(mesh._refined_groups())
+
+
+def summary(mesh: TriangleMesh) -> str:
+    """Describe a mesh in four lines: counts, size, topology and quality of its faces."""
+    extent = np.ptp(mesh.rest_positions, axis=0)
+    parts = "1 part" if mesh.n_components == 1 else f"{mesh.n_components} parts"
+    loops = [len(loop) for loop in mesh.boundary_loops]
+    if not loops:
+        boundary = "closed"
+    elif len(loops) == 1:
+        boundary = f"1 boundary loop of {loops[0]} edges"
+    else:
+        boundary = f"{len(loops)} boundary loops of {min(loops)} to {max(loops)} edges"
+    quality = mesh.quality
+    return (
+        f"TriangleMesh: {mesh.n_vertices} vertices, {mesh.n_faces} faces, {mesh.n_edges} edges\n"
+        f"  size: {' x '.join(f'{length:.4g}' for length in extent)} m, area {mesh.face_areas.sum():.4g} m2\n"
+        f"  shape: {parts}, {boundary}\n"
+        f"  faces: edges {mesh.edge_lengths.min():.3g} to {mesh.edge_lengths.max():.3g} m, "
+        f"angles {np.degrees(quality.smallest_angles.min()):.1f} to "
+        f"{np.degrees(quality.largest_angles.max()):.1f} deg, aspect at most {quality.aspects.max():.3g}"
+        f"{mesh._groups_text()}"
+    )
+
+
+def boundary_loops(mesh: TriangleMesh) -> list[np.ndarray]:
+    """Return the vertices of each boundary curve, in the direction of its faces, beginning at its lowest boundary edge."""
+    starts = {}  # boundary edge -> the vertex its face leaves
+    for edge in mesh.boundary_edges:
+        forward = mesh.edge_faces[edge, 0] >= 0
+        starts[int(edge)] = int(mesh.edges[edge, 0 if forward else 1])
+    loops, seen = [], set()
+    for first in starts:
+        loop, edge = [], first
+        while edge not in seen:
+            seen.add(edge)
+            loop.append(starts[edge])
+            edge = _next_boundary_edge(mesh, edge)
+        if loop:
+            loops.append(np.array(loop))
+    return loops
+
+
+def _next_boundary_edge(mesh, edge: int) -> int:
+    """Return the boundary edge that follows in its loop.
+
+    The search rotates about the common vertex from face to face, so that several fans of faces at a vertex stay separate.
+    """
+    face = int(mesh.edge_faces[edge].max())
+    while True:
+        corner = int(np.flatnonzero(mesh.face_edges[face] == edge)[0])
+        edge = int(mesh.face_edges[face, (corner + 1) % 3])
+        here, there = mesh.edge_faces[edge]
+        if here < 0 or there < 0:
+            return edge
+        face = int(there if here == face else here)

@@ -18,14 +18,15 @@ from ..._input.scalars import positive
 from ..._runtime.files import replace_file
 from ..._runtime.solver_entry_point import grouped
 from ..results.probes import Probe
+from ..results.series_probes import probe_columns
 from ..results.state import State, states_of, with_times
+from ..results.tables import coordinate_of
 from ..results.units import LengthUnit, length_unit, prefixed, with_unit
 from . import colors, glyphs
 from .colors import Scalar, scalar_of
 from .drawing import checked_titles
 from .limits import arrow_count
 from .outlines import outline
-from .page_history import page_history
 from .page_surroundings import PageSurroundings
 from .panels import FLESH, size_of
 from .playback import SAMPLES, evenly_spaced, same_faces, speed_of
@@ -311,3 +312,18 @@ def _packed(array: np.ndarray, dtype: str) -> str | dict[Any, Any]:
 def _plain(label: str) -> str:
     """Return a label without matplotlib's mathematical markup."""
     return label.replace("$", "").replace("^3", "³").replace("M_r", "Mᵣ")
+
+
+def page_history(
+    what: Any, probes: Probe | Sequence[Probe], positions: Any
+) -> tuple[str, np.ndarray, dict[str, np.ndarray]] | None:
+    """Return the name and the values (n,) of what curves are drawn over, and the columns {name: (n,)}; None without probes.
+
+    Raises ValueError as `probe_columns` does.
+    """
+    columns = probe_columns(what, probes, positions)
+    if not columns:
+        return None
+    name, values = coordinate_of(what)
+    along = np.zeros(1) if values is None else np.asarray(values, dtype=np.float64)
+    return {"time": "time [s]", None: ""}.get(name, name), along, columns

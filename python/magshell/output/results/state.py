@@ -28,7 +28,7 @@ from ...model.solids.solid_stresses import SolidStates
 from ...solve.dynamics.trajectory import Trajectory
 from ...solve.statics.equilibria import EquilibriumSet
 from ...solve.statics.path import EquilibriumPath
-from .contact_loads import ContactLoads, contact_loads
+from .forces import ContactLoads, contact_loads, nodal_forces
 from .link_surfaces import (
     joined,
     link_surfaces_at_rest,
@@ -40,7 +40,6 @@ from .link_surfaces import (
     tendons_of,
 )
 from .magnets import surfaces_of
-from .nodal_forces import nodal_forces
 from .spring_surfaces import creases_of, springs_at_rest, springs_of
 from .surroundings import obstacles_in, surroundings_of
 from .units import clock

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,11 +11,23 @@ import torch
 
 from ...errors import NoGradient
 from .autograd import numbers_of
-from .energy import POSITIONAL
-from .energy_by_values import is_positional, rates_along_values
+from .curvature import moved_inputs, rows_of
+from .differences import directional_derivative
+from .energy import POSITIONAL, EnergyAdjoint
+from .tangent import steps_along
 
 if TYPE_CHECKING:
-    from .energy import EnergyAdjoint
+    from ...model.scene.solve_inputs import Leaf
+
+
+_THIRD = (
+    "no third derivatives of energies: there are gradients and Hessians. Take differences of the second ones."
+)
+# Fractions (1) of the first step that are tried. Tested by test_second_derivatives_by_values_agree_with_differences.
+_SHORTER = (1.0, 0.1, 1e-2)
+# The error (1) of derivatives with respect to values, over their largest entry: they are differences themselves. Tested
+# by the same.
+_OF_DIFFERENCES = 1e-11
 
 
 class _Energies(torch.autograd.Function):
@@ -101,11 +115,6 @@ class _WeightedGradient(torch.autograd.Function):
         return None, None, *by_inputs
 
 
-_THIRD = (
-    "no third derivatives of energies: there are gradients and Hessians. Take differences of the second ones."
-)
-
-
 class _NoFurther(torch.autograd.Function):
     """Gradients connected to the tensors that they depend on, so that their derivatives raise NoGradient, with a reason."""
 
@@ -139,3 +148,58 @@ def gradient_of(
     """Return the gradient of the sum with respect to positions and edge rotations, as tensors connected to the leaves."""
     weights = torch.ones(adjoint.count, dtype=torch.float64)
     return _WeightedGradient.apply(adjoint, dtype, weights, *leaves)
+
+
+def is_positional(leaf: Leaf) -> bool:
+    """Return whether a leaf holds positions or edge rotations."""
+    return leaf.owner is None and leaf.name in POSITIONAL
+
+
+def rates_along_values(
+    adjoint: EnergyAdjoint,
+    weights: np.ndarray,
+    along: Sequence[np.ndarray | None],
+    wanted: Sequence[bool],
+) -> tuple[np.ndarray, list[np.ndarray | None]]:
+    """Compute the derivatives of u . dE/dk by the weights (n,), and by the wanted leaves.
+
+    along: u, one change for each leaf; None for positions. Raises NoGradient where there are none.
+    """
+    inputs = adjoint.inputs
+    values = [leaf for leaf in inputs.leaves if not is_positional(leaf)]
+    changes = [
+        np.zeros(leaf.shape) if change is None else change
+        for leaf, change in zip(inputs.leaves, along, strict=True)
+        if not is_positional(leaf)
+    ]
+    if not any(np.any(each) for each in changes):
+        leaves = zip(inputs.leaves, wanted, strict=True)
+        return np.zeros_like(weights), [np.zeros(leaf.shape) if asked else None for leaf, asked in leaves]
+    base = copy.copy(inputs)
+    base.leaves = values
+
+    def at(step: float) -> list[np.ndarray]:
+        there = adjoint.with_inputs(moved_inputs(base, [step * each for each in changes]), inputs.leaves)
+        with there.inputs.in_core():
+            energies = np.array([*there.by_name().values()])
+        found = there.gradients(weights, wanted)
+        return [energies, *(each.ravel() for each in found if each is not None)]
+
+    steps = [
+        steps_along(inputs, leaf, change)
+        for leaf, change in zip(values, changes, strict=True)
+        if np.any(change)
+    ]
+    first = min(each[0] for each in steps)
+    parts = at(0.0)
+    rates = directional_derivative(
+        lambda step: rows_of(at(step)), [first * shorter for shorter in _SHORTER], _OF_DIFFERENCES
+    )
+    if rates is None:
+        raise NoGradient("no second derivatives of energies here: they are not smooth in the values")
+    found = iter(row[: part.size] for row, part in zip(rates[1:], parts[1:], strict=True))
+    by_leaves = [
+        next(found).reshape(leaf.shape) if asked else None
+        for leaf, asked in zip(inputs.leaves, wanted, strict=True)
+    ]
+    return rates[0][: weights.size], by_leaves

@@ -10,7 +10,6 @@ from ...model.bodies.words import called
 from ...model.fields.magnet_overlap import describe_magnet_overlap
 from ...model.shells.obtuse_faces import describe_faces
 from ...model.supports.constraints import free_rigid_motions
-from .load_strain import strain_of_loads
 from .solve_log import SolveLog, SolveStep, steps_of
 
 if TYPE_CHECKING:
@@ -24,6 +23,24 @@ _MOST_NAMED = 4  # vertices in a message
 LARGEST_STRAIN = 1.0  # [-] by what acts at rest: beyond, a unit is likely to be wrong
 _SMALLEST_MOVE = (
     1e-6  # [-] of the scene's size, in one relaxation step: below, relaxation came to a standstill
+)
+
+
+_STRETCH = 1e-3  # of all lengths
+_OTHER_TERMS = frozenset(
+    (
+        "contact",
+        "body contact",
+        "couple",
+        "joints",
+        "loads",
+        "gravity",
+        "magnetic",
+        "moments",
+        "pressure",
+        "volume",
+        "wrenches",
+    )
 )
 
 
@@ -198,3 +215,26 @@ def _general_advice(inputs, found, at_rest: bool) -> str:
 
 def _listed(numbers: np.ndarray) -> str:
     return ", ".join(map(str, numbers.tolist()))
+
+
+def strain_of_loads(inputs: Inputs) -> float:
+    """Return the even strain at which the elastic energy 1/2 C e^2 balances the work W e of what acts at the rest shape,
+    W / C: W = sum |f| |x - mean x| over the vertices. Zero where that says nothing, as of scenes with rigid parts.
+    """
+    scene = inputs.scene
+    if scene.rigid_parts or not scene.bodies:
+        return 0.0
+    model, x = scene._model, scene.mesh.rest_positions
+    arms = x - x.mean(axis=0)
+    rest, nothing = model.rest_state(), scene._load_parameter_layout.zeros()
+    with inputs.in_core():
+        force = model.positions(model.gradient(rest, inputs.load_parameters))
+        stretched = model.state(x + _STRETCH * arms, np.zeros(scene._bodies.n_rotations))
+        energies = [_elastic_energy(model.term_energies(each, [], nothing)) for each in (stretched, rest)]
+    stiffness = 2.0 * (energies[0] - energies[1]) / _STRETCH**2
+    work = float((np.linalg.norm(force, axis=1) * np.linalg.norm(arms, axis=1)).sum())
+    return work / stiffness if stiffness > 0.0 and np.isfinite(work) else 0.0
+
+
+def _elastic_energy(energies: list[tuple[str, float]]) -> float:
+    return sum(energy for name, energy in energies if name not in _OTHER_TERMS)
