@@ -40,8 +40,7 @@ def test_a_field_that_points_to_the_target_does_so(reaching) -> None:
     assert np.degrees(reaching["start"]["angles"][settled]).max() < 5.0
 
 
-def test_an_iteration_is_quick(reaching) -> None:
-    assert reaching["seconds"] / reaching["iterations"] < 5.0  # 0.4 s on a machine of its own
+def test_each_cell_has_three_variables(reaching) -> None:
     assert reaching["variables"] == 3 * 13
 
 
