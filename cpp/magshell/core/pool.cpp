@@ -8,8 +8,12 @@ namespace {
 
 // Waking a sleeping thread costs the caller 10 us, and it starts after another 30 us, so a loop must be long enough. Loops follow each other
 // closely, so helpers look for the next one for a while before they sleep.
+#if defined(__SANITIZE_THREAD__)  // the small scenes of tests are to meet several threads
+constexpr Nanoseconds worth_waking = 1, worth_a_helper = 1, patience = 20'000'000;
+#else
 constexpr Nanoseconds worth_waking = 100'000, worth_a_helper = 50'000;
-constexpr Nanoseconds patience = 200'000;    // [ns] for which a helper looks for the next loop
+constexpr Nanoseconds patience = 200'000;  // [ns] for which a helper looks for the next loop
+#endif
 constexpr Nanoseconds short_wait = 100'000;  // [ns] for which the caller waits actively
 
 void pause() {
