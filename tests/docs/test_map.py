@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.cases import CASES, SOLID_CASES
+
 ROOT = Path(__file__).parents[2]
 MAP = ROOT / "docs" / "map.md"
 PAGES = [MAP, *sorted((ROOT / "docs" / "adding").glob("*.md"))]
@@ -52,6 +54,14 @@ def test_first_files_for_a_reader_are_in_their_room():
         folder = ROOT / "python" / "magshell" / cells[0].strip("`").replace(".", "/")
         missing += [f"{folder.name}/{name}" for name in names(cells[2]) if not (folder / name).is_file()]
     assert missing == []
+
+
+def test_every_case_of_the_accuracy_tables_is_listed_with_a_file_that_names_it():
+    listed = {code: cells[2] for cells in rows("Codes of cases") for code in cells[0].split(", ")}
+    cases = {case.name.split()[0].split("-")[0] for case in (*CASES, *SOLID_CASES)}
+    assert cases - set(listed) == set()
+    for code, file in listed.items():
+        assert re.search(rf"\b{code}\b", (ROOT / names(file)[0]).read_text()), code
 
 
 def test_each_room_has_tests():
