@@ -78,6 +78,11 @@ def selection(name: str, values: Any, of: str | None = None) -> np.ndarray:
     return own
 
 
+def count_of(selected: np.ndarray) -> int:
+    """Return how many entities a selection has, which may be a mask."""
+    return int(np.count_nonzero(selected)) if selected.dtype == bool else len(selected)
+
+
 def indices(name: str, array: np.ndarray, count: int) -> np.ndarray:
     """Return a selection as distinct int64 indices into `count` entities, (k,) with k > 0. Raises ValueError on a bad
     index."""

@@ -9,7 +9,7 @@ import numpy as np
 from ... import _core
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
-from ..._input.selections import indices, selection
+from ..._input.selections import count_of, indices, selection
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..bodies.bodies import checked_body, on_body
 from ..shells.shell import Shell
@@ -75,7 +75,7 @@ class FaceEnergy(Owner):
         return chosen
 
     def __repr__(self) -> str:
-        where = "all faces" if self.faces is None else f"{len(self.faces)} faces"
+        where = "all faces" if self.faces is None else f"{count_of(self.faces)} faces"
         return f"{type(self).__name__}({where}{on_body(self.body)})"
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.given_values import rest_tensor_of
-from ..._input.selections import indices, selection
+from ..._input.selections import count_of, indices, selection
 from ..._input.tensors import as_operand
 from ..bodies.bodies import Bodies, checked_body, on_body
 from ..shells.shell import Shell
@@ -59,7 +59,7 @@ class ElasticFoundation(Springs):
     ):
         self.faces: np.ndarray | None = None if faces is None else selection("ElasticFoundation faces", faces)
         self.body: Shell | Solid | None = checked_body(body)
-        count = None if self.faces is None else len(self.faces)
+        count = None if self.faces is None else count_of(self.faces)
         self.stiffness: np.ndarray = numbers_of_springs("stiffness", "N/m3", stiffness, count, "face")
         self.damping: np.ndarray | None = (
             None if damping is None else numbers_of_springs("damping", "N s/m3", damping, count, "face")
@@ -203,7 +203,7 @@ class ElasticFoundation(Springs):
         return FoundationResult(result, self)
 
     def __repr__(self) -> str:
-        where = "all faces" if self.faces is None else f"{len(self.faces)} faces"
+        where = "all faces" if self.faces is None else f"{count_of(self.faces)} faces"
         return (
             f"ElasticFoundation({where}, stiffness={float(self.stiffness.mean()):g} N/m3{on_body(self.body)})"
         )

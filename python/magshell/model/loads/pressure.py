@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
-from ..._input.selections import indices, selection
+from ..._input.selections import count_of, indices, selection
 from ...mesh.face_shapes import sides
 from ..bodies.bodies import Bodies, checked_body, on_body
 from ..shells.shell import Shell
@@ -97,5 +97,5 @@ class Pressure(Owner):
         }
 
     def __repr__(self) -> str:
-        where = "all faces" if self.faces is None else f"{len(self.faces)} faces"
+        where = "all faces" if self.faces is None else f"{count_of(self.faces)} faces"
         return f"Pressure({where}{on_body(self.body)})"

@@ -9,7 +9,7 @@ import numpy as np
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
 from ..._input.scalars import positive
-from ..._input.selections import selection
+from ..._input.selections import count_of, selection
 from ..._runtime.frozen import Frozen, variant
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.generate.stuffed import from_distance
@@ -251,7 +251,7 @@ class RigidBody(Owner):
         return {**none, "angular_velocity": np.zeros(3), **found}
 
     def __repr__(self) -> str:
-        what = "free" if self.vertices is None else f"{np.size(self.vertices)} vertices"
+        what = "free" if self.vertices is None else f"{count_of(self.vertices)} vertices"
         mass = "" if self.mass is None else f", mass {self.mass:g} kg"
         magnet = (
             ""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
-from ..._input.selections import indices, selection
+from ..._input.selections import count_of, indices, selection
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -74,9 +74,10 @@ class Crease(Owner):
 
     def _checked(self, name: str, unit: str, value: Any) -> np.ndarray:
         array = real_numbers(f"{name} [{unit}]", value)
-        if array.shape not in ((), (len(self.edges),)):
+        count = count_of(self.edges)
+        if array.shape not in ((), (count,)):
             raise ValueError(
-                f"{name} [{unit}] must be a number or one for each edge, ({len(self.edges)},), got shape {array.shape}"
+                f"{name} [{unit}] must be a number or one for each edge, ({count},), got shape {array.shape}"
             )
         return quantity(name, unit, array, array.shape)
 
@@ -118,7 +119,7 @@ class Crease(Owner):
         return bool(np.abs(folds - self.angle).max() > _FLAT)
 
     def __repr__(self) -> str:
-        return f"Crease({len(self.edges)} edges, stiffness {float(self.stiffness.mean()):g} N)"
+        return f"Crease({count_of(self.edges)} edges, stiffness {float(self.stiffness.mean()):g} N)"
 
 
 def check_creases(creases: Iterable[Crease], mesh: TriangleMesh) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._input.owner import Owner
 from ..._input.quantity import quantity, real_numbers
-from ..._input.selections import indices, selection
+from ..._input.selections import count_of, indices, selection
 from ..._runtime.frozen import variant
 from ...mesh.rest_shape import by_areas
 from ...mesh.tetrahedra.tet_mesh import TetMesh
@@ -199,7 +199,7 @@ class Skin(Owner):
         }
 
     def __repr__(self) -> str:
-        where = "all faces" if self.faces is None else f"{len(self.faces)} faces"
+        where = "all faces" if self.faces is None else f"{count_of(self.faces)} faces"
         low, high = self.thickness.min(), self.thickness.max()
         mass = ""
         if self.mass_density is not None:

@@ -10,7 +10,7 @@ import scipy
 
 from ..._input.quantity import quantity
 from ..._input.scalars import positive
-from ..._input.selections import indices, selection
+from ..._input.selections import count_of, indices, selection
 from ...mesh.selection import RELATIVE_TOLERANCE
 from ..bodies.bodies import checked_body, on_body
 from .supports import DirectedEdges, Held, RigidMove, Support, checked_components, refuse_corners_alone
@@ -108,7 +108,7 @@ class EqualDisplacement(DisplacementTie):
 
     def __repr__(self) -> str:
         along = ", ".join(f"{value:g}" for value in self.direction)
-        return f"EqualDisplacement({len(self.vertices)} vertices, along ({along}){on_body(self.body)})"
+        return f"EqualDisplacement({count_of(self.vertices)} vertices, along ({along}){on_body(self.body)})"
 
 
 class Periodic(DisplacementTie):
@@ -227,6 +227,6 @@ class Periodic(DisplacementTie):
     def __repr__(self) -> str:
         by = "unknown" if self.displacement is None else "given"
         return (
-            f"Periodic({len(self.vertices)} pairs, components {self.components}, {by} displacement"
+            f"Periodic({count_of(self.vertices)} pairs, components {self.components}, {by} displacement"
             f"{on_body(self.body)})"
         )

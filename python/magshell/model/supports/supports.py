@@ -10,7 +10,7 @@ import numpy as np
 from ..._input.owner import Owner
 from ..._input.quantity import quantity
 from ..._input.scalars import not_negative
-from ..._input.selections import indices, selection
+from ..._input.selections import count_of, indices, selection
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
@@ -135,7 +135,7 @@ class Pin(Support):
 
     def __repr__(self) -> str:
         done = self._move.summary() + on_body(self.body)
-        return f"Pin({len(self.vertices)} vertices, components {self.components}{done})"
+        return f"Pin({count_of(self.vertices)} vertices, components {self.components}{done})"
 
 
 def checked_components(components: str) -> str:
@@ -196,7 +196,7 @@ class Clamp(Support):
         )
 
     def __repr__(self) -> str:
-        return f"Clamp({len(self.edges)} edges{self._move.summary()}{on_body(self.body)})"
+        return f"Clamp({count_of(self.edges)} edges{self._move.summary()}{on_body(self.body)})"
 
 
 class SymmetryPlane(Support):
