@@ -138,7 +138,7 @@ def test_solve_without_log_handlers_prints_nothing(capsys):
     assert capsys.readouterr() == ("", "") and not logging.getLogger("magshell").handlers
 
 
-def test_one_solve_makes_no_progress_bar(monkeypatch):
+def test_a_single_solve_shows_no_progress_bar(monkeypatch):
     """Check that the bar is not even created before its delay, which a slow machine does not reach here."""
     monkeypatch.setattr(bars, "_DELAY", 60.0)
     monkeypatch.setattr(bars, "progress_bar", lambda *_, **__: pytest.fail("a bar was made"))
