@@ -1,4 +1,4 @@
-"""Finer meshes of a sheet or solid: of second order, divided, or bisected, and how they descend from the coarse mesh."""
+"""Finer meshes of the same sheet: of second order, divided, or bisected, and how they descend from the coarse mesh."""
 
 from __future__ import annotations
 
@@ -11,10 +11,6 @@ import scipy
 
 from .groups import row_numbers
 from .off_surface import curved_edges
-from .tetrahedra.jacobian import shape_values
-from .tetrahedra.refine import BARYCENTRIC, CHILDREN
-from .tetrahedra.tet_mesh import TetMesh
-from .topology import EDGES, FACES
 from .triangles.six_node_checks import inner_weights, weights_between
 from .triangles.six_node_mesh import QuadraticTriangleMesh, projected
 from .triangles.smooth_fit import middles_on_fit
@@ -134,7 +130,7 @@ def bisected(mesh: Sheet, marked: np.ndarray, project: Project | None, planes: A
         mesh,
         fine,
         element_parents=parents,
-        edge_parents=_edge_parents(mesh, split_edges, new, fine),
+        edge_parents=edge_parents(mesh, split_edges, new, fine),
         new_edges=split_edges,
         new_elements=np.full(len(split_edges), -1),
         interpolation=means,
@@ -175,14 +171,14 @@ def _bisected_six(mesh: QuadraticTriangleMesh, marked: np.ndarray, project: Proj
         mesh,
         fine,
         element_parents=parents,
-        edge_parents=_edge_parents(mesh, split_edges, new, fine),
+        edge_parents=edge_parents(mesh, split_edges, new, fine),
         new_edges=on_edge,
         new_elements=np.where(on_edge < 0, owners[is_new], -1),
         interpolation=interpolation,
     )
 
 
-def _edge_parents(mesh: Sheet, split_edges: np.ndarray, new: np.ndarray, fine: Sheet) -> np.ndarray:
+def edge_parents(mesh: Any, split_edges: np.ndarray, new: np.ndarray, fine: Any) -> np.ndarray:
     """Return the coarse edge that each edge of the finer mesh lies on, -1 inside elements; `new`: the middle of edges."""
     ends, between = mesh.edges[split_edges], new[split_edges]
     halves = np.stack([ends[:, 0], between, between, ends[:, 1]], axis=1).reshape(-1, 2)
@@ -310,66 +306,3 @@ def divided_faces(mesh: TriangleMesh, split_edges: np.ndarray) -> tuple[np.ndarr
     parents = np.concatenate([number[here] for here, _ in parts])
     order = np.argsort(parents, kind="stable")
     return faces[order].astype(np.int32), parents[order]
-
-
-def finer_solid(mesh: TetMesh) -> FinerMesh:
-    """Return the mesh of ten-node tetrahedra on the same four-node ones, or with each ten-node one divided into eight."""
-    return _second_order(mesh) if mesh.order == 1 else _divided(mesh)
-
-
-def _second_order(mesh: TetMesh) -> FinerMesh:
-    edges, elsewhere = np.arange(mesh.n_edges), np.full(mesh.n_edges, -1)
-    means = interpolation_rows(mesh.n_vertices, mesh.edges, np.full(mesh.edges.shape, 0.5))
-    return FinerMesh(
-        mesh,
-        mesh._with_members({}).second_order(),
-        element_parents=np.arange(mesh.n_tetrahedra),
-        edge_parents=edges,
-        new_edges=edges,
-        new_elements=elsewhere,
-        interpolation=means,
-        new_sides=elsewhere,
-        side_parents=np.arange(len(mesh.faces_of_corners)),
-    )
-
-
-def _divided(mesh: TetMesh) -> FinerMesh:
-    """Return the mesh divided into eight; the midside node of each new edge is in the order of the new edges."""
-    fine = mesh._with_members({}).refined()
-    # Barycentric coordinates in the parent of the middle of each edge of each child, for the first child that has it.
-    first = np.unique(fine.tetrahedron_edges.ravel(), return_index=True)[1]
-    middles = 0.5 * (BARYCENTRIC[CHILDREN[:, EDGES[:, 0]]] + BARYCENTRIC[CHILDREN[:, EDGES[:, 1]]])
-    middle = np.tile(middles.reshape(-1, 4), (mesh.n_tetrahedra, 1))[first]
-    parent = first // (8 * len(EDGES))
-    inside = middle > 0.0
-    count = inside.sum(axis=1)
-    new_edges, new_sides, new_elements = (np.full(len(first), -1) for _ in range(3))
-    for k, ends in enumerate(EDGES):
-        here = (count == 2) & inside[:, ends].all(axis=1)
-        new_edges[here] = mesh.tetrahedron_edges[parent[here], k]
-    on_side = count == 3
-    new_sides[on_side] = _outer_side(mesh, 4 * parent[on_side] + (~inside[on_side]).argmax(axis=1))
-    new_elements[(new_edges < 0) & (new_sides < 0)] = parent[(new_edges < 0) & (new_sides < 0)]
-    weights = interpolation_rows(mesh.n_vertices, mesh.tetrahedra[parent], shape_values(middle))
-    child, face = np.divmod(fine._outer, 4)
-    corners = BARYCENTRIC[CHILDREN[child % 8][np.arange(len(child))[:, None], FACES[face]]]
-    opposite = (
-        (corners == 0.0).all(axis=1).argmax(axis=1)
-    )  # the parent's corner that its side lies opposite to
-    return FinerMesh(
-        mesh,
-        fine,
-        element_parents=np.repeat(np.arange(mesh.n_tetrahedra), 8),
-        edge_parents=new_edges,
-        new_edges=new_edges,
-        new_elements=new_elements,
-        interpolation=weights,
-        new_sides=new_sides,
-        side_parents=_outer_side(mesh, 4 * (child // 8) + opposite),
-    )
-
-
-def _outer_side(mesh: TetMesh, faces: np.ndarray) -> np.ndarray:
-    """Return the number among the outer sides of faces 4 t + i of tetrahedra, -1 for inner ones."""
-    place = np.minimum(np.searchsorted(mesh._outer, faces), len(mesh._outer) - 1)
-    return np.where(mesh._outer[place] == faces, place, -1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
-from magshell.mesh.finer import finer_solid
+from magshell.mesh.finer_solid import finer_solid
 from magshell.model.scene.finer_scene import finer_scene, held_vertices
 
 torch = pytest.importorskip("torch")
@@ -153,5 +153,3 @@ def test_objects_of_solids_that_do_not_go_over_are_refused_by_name():
     scene = ms.Scene(body, supports=[pin], loads=[ms.Pressure(1.0, faces=one)])
     with pytest.raises(ValueError, match="load whole sides"):
         ms.error_estimate(ms.equilibrium(scene), height_at([0]))
-    with pytest.raises(ValueError, match="refines sheets only"):
-        ms.refined_for(bent(1, "quadratic")[0], height_at([0]), 1e-6)

@@ -155,6 +155,7 @@ def _finer_solid(scene: Scene, values: Values, k: int, finer: FinerMesh) -> Soli
         return Solid(
             finer.mesh,
             material=solid.material.replaced(**differ) if differ else solid.material,
+            element="linear" if finer.mesh.order == 1 else "quadratic",
             mean_volume=None if solid.element == "linear" else solid.mean_volume,
             magnetization_law=solid.magnetization_law,
             **of_elements,

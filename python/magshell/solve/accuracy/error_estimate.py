@@ -14,7 +14,8 @@ from ... import _core
 from ..._input.scalars import flag
 from ..._runtime.frozen import immutable
 from ..._runtime.solver_entry_point import solve_entry
-from ...mesh.finer import FinerMesh, divided, finer_solid, second_order
+from ...mesh.finer import FinerMesh, divided, second_order
+from ...mesh.finer_solid import finer_solid
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ...model.scene.finer_scene import refuse_what_stays
 from ...model.solids.solid import Solid
@@ -240,7 +241,7 @@ def contributions(solution: FinerSolution, adjoint: np.ndarray, positions: np.nd
         difference = _relaxed(solution, positions - solution.positions)
         largest = np.abs(model.positions(difference)).max()
         if largest == 0.0:
-            return [np.zeros(_count(each.coarse)) for each in solution.finer]
+            return [np.zeros(n_elements(each.coarse)) for each in solution.finer]
         step = _STEP * min(body.mesh.edge_lengths.min() for body in scene.bodies) / largest
         ahead, behind = (_by_values(solution, sign * step * difference, adjoint) for sign in (1.0, -1.0))
     change = (ahead - behind) / (2.0 * step)
@@ -254,11 +255,11 @@ def contributions(solution: FinerSolution, adjoint: np.ndarray, positions: np.nd
         if (label, "remanent_magnetization") in scene._value_layout:
             by_magnetization = scene._value_layout.of(change, label, "remanent_magnetization").reshape(-1, 3)
             of_elements = of_elements + (by_magnetization * body.remanent_magnetization).sum(axis=1)
-        found.append(-np.bincount(each.element_parents, of_elements, minlength=_count(each.coarse)))
+        found.append(-np.bincount(each.element_parents, of_elements, minlength=n_elements(each.coarse)))
     return found
 
 
-def _count(mesh: Any) -> int:
+def n_elements(mesh: Any) -> int:
     """Return the number of elements of a mesh."""
     return mesh.n_tetrahedra if isinstance(mesh, TetMesh) else mesh.n_elements
 

@@ -13,19 +13,21 @@ from ..._input.scalars import positive
 from ..._runtime.frozen import immutable
 from ..._runtime.solver_entry_point import solve_entry
 from ...errors import NotConverged
-from ...mesh.finer import bisected
+from ...mesh.finer import FinerMesh, bisected
+from ...mesh.finer_solid import bisected_solid
 from ...model.scene.finer_scene import finer_scene, refuse_what_stays
+from ...model.solids.solid import Solid
 from ..linear.response import linear_response
 from ..linear.single_response import LinearResponse
 from ..statics.equilibrium import Equilibrium
 from .enriched import equilibrium_on, load_keywords, positions_of
-from .error_estimate import ErrorEstimate, check_result, error_estimate, planes_of
+from .error_estimate import ErrorEstimate, check_result, error_estimate, n_elements, planes_of
 from .output_value import Output, PositionsOfResult
 
 if TYPE_CHECKING:
     from ...model.scene.scene import Scene
 
-# [-] Part of the contributions whose faces are divided in each round (Doerfler 1996); fixed by
+# [-] Part of the contributions whose elements are divided in each round (Doerfler 1996); fixed by
 # test_refined_meshes_need_fewer_unknowns_than_uniform_ones.
 _BULK = 0.5
 _LEAST_TOLERANCE = (
@@ -80,10 +82,10 @@ def refined_for(
 ) -> RefinedResult:
     """Refine the mesh of a result until an output is as accurate as asked for, and solve again on each mesh.
 
-    In each round ms.error_estimate tells the error and its faces. The faces with the largest contributions, half of all
-    contributions together, are divided into four, and their neighbours bisected across their longest edges, so that the mesh
-    stays conforming (Doerfler 1996, Rivara 1984). Materials, magnetization, supports, loads, fields and groups go over, and
-    the next solve starts from the last solution.
+    In each round ms.error_estimate tells the error and its elements. Those with the largest contributions, half of all
+    contributions together (Doerfler 1996), are divided: faces into four, tetrahedra into eight. Their neighbours are
+    bisected across their longest edges, so that the mesh stays conforming (Rivara 1984; Plaza and Carey 2000). Materials,
+    magnetization, supports, loads, fields and groups go over, and the next solve starts from the last solution.
 
     result, output, project: as in ms.error_estimate. The output stays a function of the vertices of the mesh given, which
         keep their numbers; bodies that it names are those of the scene given.
@@ -109,10 +111,6 @@ def refined_for(
     max_unknowns = count("max_unknowns", max_unknowns)
     max_rounds = count("max_rounds", max_rounds, 0)
     refuse_what_stays(result.scene)
-    if result.scene._bodies.solids:
-        raise ValueError(
-            "ms.refined_for refines sheets only, and the scene has a Solid: take a finer mesh of it, mesh.refined()"
-        )
     given = result.scene
     before = Output(output, given)  # refuses what is no function
     _refuse_round_off(tolerance, before, result)
@@ -130,7 +128,7 @@ def refined_for(
 
 
 def marked_faces(by_face: np.ndarray) -> np.ndarray:
-    """Return the fewest faces with at least half of all contributions by magnitude, ascending (Doerfler 1996)."""
+    """Return the fewest elements with at least half of all contributions by magnitude, ascending (Doerfler 1996)."""
     sizes = np.abs(by_face)
     order = np.argsort(-sizes, kind="stable")
     needed = int(np.searchsorted(np.cumsum(sizes[order]), _BULK * sizes.sum())) + 1
@@ -148,9 +146,10 @@ def _on_finer(
     scene, finer, first = result.scene, [], 0
     marked = marked_faces(estimate.by_face)
     for body in scene.bodies:
-        own = marked[(marked >= first) & (marked < first + body.mesh.n_elements)] - first
-        finer.append(bisected(body.mesh, own, project, planes_of(scene, body)))
-        first += body.mesh.n_elements
+        last = first + n_elements(body.mesh)
+        own = marked[(marked >= first) & (marked < last)] - first
+        finer.append(_bisected(scene, body, own, project))
+        first = last
     made = finer_scene(
         scene, result._values, {id(body): each for body, each in zip(scene.bodies, finer, strict=True)}
     )
@@ -162,6 +161,12 @@ def _on_finer(
         return equilibrium_on(result, made, tuple(finer))
     except NotConverged as failed:
         raise _missed(f"the solve on the next mesh failed: {failed}", refined) from failed
+
+
+def _bisected(scene: Scene, body: Any, marked: np.ndarray, project: Any) -> FinerMesh:
+    if isinstance(body, Solid):
+        return bisected_solid(body.mesh, marked)
+    return bisected(body.mesh, marked, project, planes_of(scene, body))
 
 
 def _on_first(output: Callable[[Any], Any], first: Scene) -> Callable[[Any], Any]:
