@@ -111,6 +111,8 @@ def test_gradient_by_rest_positions_of_grown_obtuse_faces_agrees_with_difference
         "creased at rest",
         "creased in motion",
         "a solid with muscles at rest",
+        "a solid with muscles in motion, euler",
+        "a solid with muscles in motion, tr_bdf2",
         "custom energies at rest",
         "custom energies in motion",
     ],
@@ -271,3 +273,39 @@ def test_gradient_by_rest_positions_of_a_limit_point_agrees_with_differences_of_
         return tensor(found.parameter)
 
     compare(limit, start, step=1e-6)
+
+
+@pytest.mark.parametrize("element", ["linear", "quadratic"])
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=["euler", "tr_bdf2"])
+def test_gradient_by_rest_positions_of_a_muscle_that_shortens_fast_agrees_with_differences(
+    element, integrator
+):
+    mesh = ms.meshes.box((0.1, 0.04, 0.04), cells=(2, 1, 1))
+    law = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.4)
+    body = ms.Solid(mesh, material=law, mass_density=1e3, element=element)
+    given = {"velocities": (body.rest_positions[:, :1] / 0.1) * (-0.4, 0.2, 0.3), "steps": 3}
+    given |= {"time_step": 2e-3, "integrator": integrator, **EXACT}
+    rates, places = np.linspace(-1, 1, 9), np.linspace(0.4, 1.6, 9)
+    length = np.stack([places, np.exp(-(((places - 1.05) / 0.4) ** 2))], axis=1)
+    fast = {
+        "force_velocity": np.stack([rates, 1.0 + 0.4 * np.tanh(2 * rates)], axis=1),
+        "shortening_rate": 8.0,
+    }
+
+    def scene_of(**curves):
+        muscle = ms.Muscle(
+            body, (1.0, -0.2, 0.1), peak_stress=4e4, activation=0.5, force_length=length, **curves
+        )
+        held = ms.Pin(body.mesh.vertices_at(x=0.0))
+        return ms.Scene(body, supports=[held], actuators=[muscle])
+
+    scene = scene_of(**fast)
+    x = moved(body)
+
+    def at(scene, x):
+        return ms.simulate(scene, values={body: {"rest_positions": x}}, **given).positions
+
+    ends = [np.asarray(at(each, x))[-1] for each in (scene, scene_of())]
+    assert np.abs(ends[0] - ends[1]).max() > 1e-3 * np.abs(ends[0] - x).max()  # the curve matters
+    weights = weights_of(np.shape(at(scene, x)))
+    compare(lambda x: 1e3 * (weights * tensor(at(scene, x))).sum(), x)
