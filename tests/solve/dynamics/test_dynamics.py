@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from magshell._runtime.progress import SolveBar
 
 MESH = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2), irregular=0.2, seed=1)
 N_V = MESH.n_vertices
@@ -200,8 +201,15 @@ def test_non_finite_field_is_named():
         simulate(scene, applied_flux_density=None)
 
 
-def test_ctrl_c_keeps_the_motion(strip):
-    threading.Timer(2.0, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+def test_ctrl_c_keeps_the_motion(strip, monkeypatch):
+    begun = threading.Event()
+    monkeypatch.setattr(SolveBar, "to", lambda bar, fraction: begun.set() if fraction > 0.0 else None)
+
+    def interrupt_once_begun() -> None:
+        if begun.wait(timeout=600.0):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt_once_begun, daemon=True).start()
     with pytest.raises(ms.Interrupted, match="interrupted after") as caught:
         simulate(strip, steps=300_000, record_every=1000)
     move = caught.value.last_good

@@ -49,9 +49,12 @@ bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& r
     end_ = state_energy(end, last);
     const double at_begin = at_first.energy, at_end = end_.energy;
     const double moving = kinetic(begin), kept = at_first.of_contact;
-    const double gain = at_end + kinetic(end) - at_begin - moving - tolerated_gain * (moving + kept) -
+    const double tolerated = tolerated_gain * (moving + kept);
+    const double gain = at_end + kinetic(end) - at_begin - moving - tolerated -
                         balance_round_off * (std::abs(at_begin) + std::abs(at_end));
     if (!(gain > 0.0)) return false;
+    if (euler_ && !model_.capabilities().has_barrier && !(gain_by_contact(at_first, end, last) > tolerated))
+        return false;
     double put_in = std::max(work(step, record, load_parameters), 0.0);
     if (first != last) {
         const double changed = 0.5 * (energy(begin.q, begin.angle_branches, last) - at_begin + at_end -
@@ -59,6 +62,12 @@ bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& r
         put_in += std::max(changed, 0.0);
     }
     return gain > (1.0 + work_error) * put_in;
+}
+
+double EnergyBalance::gain_by_contact(const StateEnergy& begin, const MotionState& end,
+                                      const LoadParameters& load_parameters) const {
+    return end_.of_contact - begin.of_contact +
+           model_.contact_forces(end.q, load_parameters).dot(end.q - begin.q);
 }
 
 double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,

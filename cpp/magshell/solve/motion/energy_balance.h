@@ -11,6 +11,11 @@
 // implicit (tableau.h), w and E of the sum are without contact, and dt (v_begin + v_end)/2 . (M C + dE_C/dx) is added: the
 // acceleration C by contact and friction acts at the mean velocity, E_C is the energy of contact. With follower loads the
 // test does not apply: it could not distinguish their work from a gain.
+//
+// Implicit Euler gains energy from obstacles and smooth shapes only where the energy of contact is not convex, as that of two balls that
+// meet obliquely. With the contact forces f at the end of the step, contact itself then does more work than it stores less:
+//
+//   G = E_C(x_end) - E_C(x_begin) + f . (x_end - x_begin) > 0
 #pragma once
 
 #include <span>
@@ -26,12 +31,8 @@ class EnergyBalance {
                   const Tableau& tableau)
         : model_(model), mass_(inertia.mass), free_bodies_(free_bodies), euler_(tableau.stages == 1) {}
 
-    /// Returns true if the test applies: there is contact, and no load without potential. For implicit Euler it applies only
-    /// to contact between bodies, because that method gains no energy from obstacles.
-    bool applies() const {
-        const bool contact = euler_ ? model_.capabilities().has_barrier : model_.contacts().any();
-        return contact && !model_.capabilities().has_unsymmetric_tangent;
-    }
+    /// Returns true if the test applies: there is contact, and no load without potential.
+    bool applies() const { return model_.contacts().any() && !model_.capabilities().has_unsymmetric_tangent; }
     /// Returns true if a step to `end` gained energy; load_parameters: load parameters at its beginning and at its stages. Leaves the model
     /// evaluated at another state.
     bool gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
@@ -51,6 +52,9 @@ class EnergyBalance {
     StateEnergy state_energy(const MotionState& state, const LoadParameters& load_parameters);
     bool has_contact(const StepAlgebra& step, const SubstepRecord& record,
                      std::span<const LoadParameters> load_parameters) const;
+    /// Returns G of a step of implicit Euler to `end`, whose forces were evaluated last [J].
+    double gain_by_contact(const StateEnergy& begin, const MotionState& end,
+                           const LoadParameters& load_parameters) const;
     /// Returns the work of supports and of forces without potential over the step [J].
     double work(const StepAlgebra& step, const SubstepRecord& record,
                 std::span<const LoadParameters> load_parameters);
