@@ -72,7 +72,7 @@ def motions_of(state: np.ndarray) -> np.ndarray:
 
 
 def turning_forces(state: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-    """Return  sum_k (e_i x (e_j x r_k)) . g_k  of turns i and j of one body about its centre; zero elsewhere, (12, 12) J."""
+    """Return  sum_k (e_i x (e_j x r_k)) . g_k  of turns i and j of one body about its center; zero elsewhere, (12, 12) J."""
     out = np.zeros((2, 6, 2, 6))
     arms = state.reshape(2, -1, 3) - state.reshape(2, -1, 3).mean(axis=1, keepdims=True)
     axes = np.eye(3)
