@@ -15,7 +15,7 @@ from .timing import measure
 PAIRS, QUICK_PAIRS = 4000, 200
 CELLS, QUICK_CELLS = (32, 96), (8,)
 ALLOWED = 0.6  # [us] time per pair, gradient and Hessian, on one core (ipctk 1.6: 3.1)
-LAW = {"stiffness": 1e5, "reach": 0.4, "thickness": 0.0, "smoothing": 0.1, "penalty": False}
+LAW = {"stiffness": 1e5, "activation_distance": 0.4, "min_distance": 0.0, "smoothing": 0.1, "penalty": False}
 
 
 def contacts(quick: bool, rounds: int) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def cost_of_pairs(kind: str, count: int, rounds: int) -> dict[str, Any]:
     """Measure the cost of random pairs nearer than three quarters of the activation distance."""
     rng = np.random.default_rng(0)
     points = rng.uniform(-1.0, 1.0, (20 * count, 4, 3))
-    points = points[_core.pair_proximities(kind, points)[0] < 0.75 * LAW["reach"]][:count]
+    points = points[_core.pair_proximities(kind, points)[0] < 0.75 * LAW["activation_distance"]][:count]
     ends = points + 0.1 * rng.standard_normal(points.shape)
     parallel = 1e-3 if kind == "edge_edge" else 0.0
     return {

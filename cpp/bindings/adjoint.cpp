@@ -1,6 +1,6 @@
 // Binds the adjoints: they take the gradient with respect to positions and edge rotations and return the gradients with respect to all
 // parameters of a solve.
-#include "bindings/gradients.h"
+#include "bindings/model_numbers.h"
 #include "magshell/adjoint/static.h"
 
 namespace magshell::bindings {

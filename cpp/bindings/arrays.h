@@ -4,7 +4,9 @@
 
 #include <pybind11/eigen.h>
 
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bindings/bindings.h"
@@ -40,6 +42,17 @@ inline py::array_t<double> to_matrices(const std::vector<Mat3>& given, Index row
         for (int r = 0; r < 3; ++r)
             for (int c = 0; c < 3; ++c) *to++ = matrix(r, c);
     return out;
+}
+
+// Moves numbers of the core to a numpy array that owns them, so that large arrays are not copied.
+template <class Vector>
+py::array_t<typename Vector::value_type> given_away(Vector numbers) {
+    auto owned = std::make_unique<Vector>(std::move(numbers));
+    const auto size = static_cast<py::ssize_t>(owned->size());
+    const auto* data = owned->data();
+    const py::capsule owner(owned.get(), [](void* each) { delete static_cast<Vector*>(each); });
+    owned.release();
+    return py::array_t<typename Vector::value_type>(size, data, owner);
 }
 
 }  // namespace magshell::bindings

@@ -3,7 +3,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/call_python.h"
-#include "bindings/load_parameters.h"
+#include "bindings/model_numbers.h"
 #include "bindings/watch.h"
 
 namespace magshell::bindings {
@@ -53,10 +53,10 @@ void register_continuation(py::module_& module) {
         .def(py::init<>())
         .def_readwrite("newton", &PathOptions::newton)
         .def_readwrite("first_step", &PathOptions::first_step)
-        .def_readwrite("max_step", &PathOptions::largest_step)
+        .def_readwrite("max_step", &PathOptions::max_step)
         .def_readwrite("max_points", &PathOptions::max_points)
-        .def_readwrite("min_parameter", &PathOptions::lowest_parameter)
-        .def_readwrite("highest_parameter", &PathOptions::highest_parameter)
+        .def_readwrite("min_parameter", &PathOptions::min_parameter)
+        .def_readwrite("max_parameter", &PathOptions::max_parameter)
         .def_readwrite("locate_critical", &PathOptions::locate_critical)
         .def_readwrite("watched", &PathOptions::watched)
         .def_readwrite("branch_at", &PathOptions::branch_at)

@@ -7,8 +7,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/call_python.h"
-#include "bindings/gradients.h"
-#include "bindings/strains.h"
+#include "bindings/model_numbers.h"
 #include "bindings/watch.h"
 #include "magshell/adjoint/dynamic.h"
 #include "magshell/adjoint/motion_tangent.h"
@@ -109,8 +108,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
     input.viscosity = viscosity_of(given);
     const std::size_t branches = input.viscosity.branches.size();
     input.start.e = strains_of(model, array("maxwell_strains"), branches);
-    input.start.rates.w = to_vector(array("acceleration"));
-    if (input.start.rates.w.size() > 0) {
+    input.start.rates.acceleration = to_vector(array("acceleration"));
+    if (input.start.rates.acceleration.size() > 0) {
         input.start.rates.v = input.start.v;
         if (MaxwellStrains rates = strains_of(model, array("strain_rates"), 1); !rates.empty())
             input.start.rates.elastic.d = std::move(rates.front());
@@ -124,7 +123,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
         if (input.tableau.implicit_contact)
             input.start.rates.c = std::move(by_contact);
         else
-            input.start.rates.w += by_contact;
+            input.start.rates.acceleration += by_contact;
     }
     input.time_steps = given["time_steps"].cast<std::vector<double>>();
     input.recorded = given["recorded"].cast<std::vector<Index>>();
@@ -384,7 +383,8 @@ void register_dynamics(py::module_& module) {
         .def_readonly("begun", &MotionResult::begun)
         .def_property_readonly("last_state", [](const MotionResult& r) { return r.last.q; })
         .def_property_readonly("last_velocity", [](const MotionResult& r) { return r.last.v; })
-        .def_property_readonly("last_acceleration", [](const MotionResult& r) { return r.last.rates.w; })
+        .def_property_readonly("last_acceleration",
+                               [](const MotionResult& r) { return r.last.rates.acceleration; })
         .def_property_readonly("last_contact_acceleration",
                                [](const MotionResult& r) { return r.last.rates.c; })
         .def("last_maxwell_strains",

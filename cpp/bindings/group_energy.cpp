@@ -1,5 +1,3 @@
-#include "bindings/group_energy.h"
-
 #include <pybind11/eigen.h>
 
 #include <memory>
@@ -8,6 +6,7 @@
 #include <utility>
 
 #include "bindings/call_python.h"
+#include "bindings/scene_input.h"
 
 namespace magshell::bindings {
 namespace {

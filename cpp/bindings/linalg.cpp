@@ -6,7 +6,6 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
-#include "bindings/given_away.h"
 #include "bindings/operator_part.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"

@@ -6,11 +6,10 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
-#include "bindings/given_away.h"
+#include "bindings/model_numbers.h"
 #include "bindings/operator_part.h"
 #include "bindings/scene_input.h"
-#include "bindings/strains.h"
-#include "magshell/assembly/rough_hessian_operator.h"
+#include "magshell/assembly/hessian_operator.h"
 #include "magshell/core/errors.h"
 #include "magshell/mesh/space_filling_order.h"
 #include "magshell/solve/linear_response.h"

@@ -1,14 +1,5 @@
 // Defines the extension module: errors first, then one register function per family.
 #include "bindings/bindings.h"
-#include "bindings/group_energy.h"
-#ifdef MAGSHELL_TESTING
-#include "bindings/testing/testing.h"
-#endif
-
-namespace magshell::bindings {
-void register_body_contact(py::module_& module);
-void register_picture(py::module_& module);
-}  // namespace magshell::bindings
 
 PYBIND11_MODULE(_core, module) {
     namespace b = magshell::bindings;
@@ -19,7 +10,7 @@ PYBIND11_MODULE(_core, module) {
     b::register_mesh(module);
     b::register_field(module);
     b::register_obstacle(module);  // MeshObstacle takes a mesh
-    b::register_force(module);
+    b::register_water(module);
     b::register_face_energies(module);
     b::register_group_energy(module);
     b::register_model(module);

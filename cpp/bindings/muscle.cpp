@@ -1,11 +1,10 @@
-#include "bindings/muscle.h"
-
 #include <algorithm>
 #include <map>
 #include <optional>
 #include <string>
 
 #include "bindings/arrays.h"
+#include "bindings/scene_input.h"
 #include "magshell/scene/model.h"
 #include "magshell/terms/actuator/muscle_term.h"
 

@@ -8,14 +8,9 @@
 #include "bindings/arrays.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
-#include "magshell/obstacle/box.h"
-#include "magshell/obstacle/capsule.h"
-#include "magshell/obstacle/complement.h"
-#include "magshell/obstacle/ellipsoid.h"
 #include "magshell/obstacle/height_field.h"
 #include "magshell/obstacle/mesh_obstacle.h"
-#include "magshell/obstacle/plane.h"
-#include "magshell/obstacle/sphere.h"
+#include "magshell/obstacle/simple_shapes.h"
 #include "magshell/obstacle/tube.h"
 
 namespace magshell::bindings {

@@ -29,8 +29,6 @@ PaintedTriangles painted(const py::handle& given) {
 
 }  // namespace
 
-void register_picture(py::module_& module);
-
 void register_picture(py::module_& module) {
     module.def(
         "rasterized",

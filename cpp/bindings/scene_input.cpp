@@ -5,9 +5,6 @@
 #include <utility>
 
 #include "bindings/arrays.h"
-#include "bindings/group_energy.h"
-#include "bindings/muscle.h"
-#include "bindings/solid.h"
 
 namespace magshell::bindings {
 namespace {

@@ -1,9 +1,8 @@
-#include "bindings/solid.h"
-
 #include <algorithm>
 #include <map>
 
 #include "bindings/arrays.h"
+#include "bindings/scene_input.h"
 #include "magshell/scene/model.h"
 
 namespace magshell::bindings {

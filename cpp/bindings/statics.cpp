@@ -2,7 +2,7 @@
 #include "magshell/solve/statics.h"
 
 #include "bindings/arrays.h"
-#include "bindings/load_parameters.h"
+#include "bindings/model_numbers.h"
 #include "bindings/watch.h"
 #include "magshell/solve/linear_response.h"
 #include "magshell/solve/modes.h"

@@ -938,9 +938,9 @@ class PathOptions:
     @first_step.setter
     def first_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
-    def highest_parameter(self) -> float: ...
-    @highest_parameter.setter
-    def highest_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    def max_parameter(self) -> float: ...
+    @max_parameter.setter
+    def max_parameter(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
     @property
     def max_points(self) -> int: ...
     @max_points.setter
@@ -1316,7 +1316,7 @@ def pair_energies_by_law(
     room: typing.SupportsFloat | typing.SupportsIndex = ...,
 ) -> numpy.typing.NDArray[numpy.float64]:
     """
-    Derivatives of lambda . gradient + by_normal_force * normal_force by stiffness, reach, thickness, smoothing: (n, 4).
+    Derivatives of lambda . gradient + by_normal_force * normal_force by stiffness, activation_distance, min_distance, smoothing: (n, 4).
     """
 
 def pair_free_shares(

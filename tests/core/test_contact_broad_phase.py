@@ -136,7 +136,13 @@ def pressure_on(columns, positions, law):
 @pytest.mark.parametrize("cells", [(1, 1), (4, 4), (9, 7)])
 def test_a_flat_mesh_is_as_good_as_a_plane(cells) -> None:
     # A smaller sheet above a larger one: the energy is area times stiffness times b from both sides, whatever the meshes.
-    law = {"stiffness": 1e3, "reach": 0.2, "thickness": 0.0, "smoothing": 1.0, "penalty": False}
+    law = {
+        "stiffness": 1e3,
+        "activation_distance": 0.2,
+        "min_distance": 0.0,
+        "smoothing": 1.0,
+        "penalty": False,
+    }
     gap = 0.05
     positions, surfaces = stacked(grid(cells, 0.0, 3.0), grid((5, 5), gap, 1.0, (1.03, 0.97)))
     found = broad_phase(positions, surfaces, [(0, 1)]).near(positions, [0.2])
@@ -153,7 +159,13 @@ def test_a_flat_mesh_is_as_good_as_a_plane(cells) -> None:
 
 
 def test_a_point_is_pushed_away_wherever_it_is_on_a_crumpled_sheet() -> None:
-    law = {"stiffness": 1.0, "reach": 0.3, "thickness": 0.0, "smoothing": 1.0, "penalty": False}
+    law = {
+        "stiffness": 1.0,
+        "activation_distance": 0.3,
+        "min_distance": 0.0,
+        "smoothing": 1.0,
+        "penalty": False,
+    }
     rng = np.random.default_rng(4)
     vertices, faces = grid((4, 4))
     vertices = vertices + np.c_[np.zeros((25, 2)), 0.2 * rng.standard_normal(25)]
@@ -203,7 +215,13 @@ def test_adjacent_cells_of_a_sheet_have_smaller_thickness_than_layers() -> None:
     assert along_one.sum() > 50
     assert np.allclose(found["room"][along_one], 0.5 * distances[along_one])
     flat = mesh.rest_positions
-    law = {"stiffness": 1.0, "reach": 0.003, "thickness": 0.003, "smoothing": 1.0, "penalty": False}
+    law = {
+        "stiffness": 1.0,
+        "activation_distance": 0.003,
+        "min_distance": 0.003,
+        "smoothing": 1.0,
+        "penalty": False,
+    }
     plain = broad_phase(flat, [mesh.faces], [(0, 0)])
     plain.make_room(flat, [0.012])
     found = plain.near(flat, [0.012])

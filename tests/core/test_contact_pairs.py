@@ -9,12 +9,12 @@ from magshell import _core
 AREA, PARALLEL = 0.3, 0.05  # m2; m4: a twentieth makes many pairs of edges nearly parallel
 
 
-def barrier(gap, reach):
+def barrier(gap, activation):
     """Return b(gap) and its first two derivatives by the formula of contact/barrier.h, in m, 1 and 1/m."""
-    y = gap / reach
-    value = -reach * (1 - y) ** 2 * np.log(y)
+    y = gap / activation
+    value = -activation * (1 - y) ** 2 * np.log(y)
     slope = 2 * (1 - y) * np.log(y) - (1 - y) ** 2 / y
-    return value, slope, (-2 * np.log(y) + 4 * (1 - y) / y + ((1 - y) / y) ** 2) / reach
+    return value, slope, (-2 * np.log(y) + 4 * (1 - y) / y + ((1 - y) / y) ** 2) / activation
 
 
 def by_ipctk(kind, x, law, parallel):
@@ -26,7 +26,7 @@ def by_ipctk(kind, x, law, parallel):
     d = np.sqrt(squared)
     slope = by_squared / (2 * d)
     hessian = twice / (2 * d) - np.outer(slope, slope) / d
-    b, b1, b2 = barrier(d - law["thickness"], law["reach"])
+    b, b1, b2 = barrier(d - law["min_distance"], law["activation_distance"])
     value, gradient, second = b, b1 * slope, b2 * np.outer(slope, slope) + b1 * hessian
     if kind == "edge_edge" and parallel > 0:
         m = ipctk.edge_edge_mollifier(*x, parallel)
@@ -40,8 +40,8 @@ def by_ipctk(kind, x, law, parallel):
 
 
 def near_ones(kind, x, law):
-    distances = _core.pair_proximities(kind, x)[0] - law["thickness"]
-    return x[(distances > 1e-9) & (distances < 0.999 * law["reach"])]
+    distances = _core.pair_proximities(kind, x)[0] - law["min_distance"]
+    return x[(distances > 1e-9) & (distances < 0.999 * law["activation_distance"])]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -61,11 +61,11 @@ def test_distances_are_those_of_ipctk(kind, gap) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("thickness", [0.0, 0.05])
+@pytest.mark.parametrize("min_distance", [0.0, 0.05])
 @pytest.mark.parametrize("gap", [0.2, 1e-2])
-def test_energies_are_those_of_ipctk(kind, thickness, gap) -> None:
-    law = LAW | {"thickness": thickness}
-    x = near_ones(kind, random_pairs(kind, 1000, gap=gap + thickness), law)
+def test_energies_are_those_of_ipctk(kind, min_distance, gap) -> None:
+    law = LAW | {"min_distance": min_distance}
+    x = near_ones(kind, random_pairs(kind, 1000, gap=gap + min_distance), law)
     assert len(x) > 600
     parallel = PARALLEL if kind == "edge_edge" else 0.0
     ours = _core.pair_energies(kind, x, AREA, parallel, law)
@@ -93,7 +93,7 @@ def test_degenerate_pairs_have_the_gradients_of_ipctk(kind) -> None:
 @pytest.mark.parametrize("kind", [*KINDS, "point_edge", "point_point"])
 @pytest.mark.parametrize("penalty", [False, True])
 def test_derivatives_are_those_of_differences(kind, penalty) -> None:
-    law = LAW | {"thickness": 0.05, "penalty": penalty}
+    law = LAW | {"min_distance": 0.05, "penalty": penalty}
     as_kind = kind if kind in KINDS else "point_triangle"
     x = near_ones(kind, random_pairs(as_kind, 300, gap=0.25), law)
     parallel = PARALLEL if kind == "edge_edge" else 0.0
@@ -159,7 +159,7 @@ def test_the_barrier_grows_without_bound_and_ends_smoothly(kind) -> None:
     pairs[:, top, 2] = gaps[:, None]
     at = _core.pair_energies(kind, pairs, AREA, 0.0, LAW)
     assert (np.diff(at["energy"][:40]) < 0).all() and (np.diff(at["normal_force"][:40]) < 0).all()
-    assert at["energy"][0] > 10 * AREA * LAW["stiffness"] * LAW["reach"]
+    assert at["energy"][0] > 10 * AREA * LAW["stiffness"] * LAW["activation_distance"]
     assert np.allclose(
         at["normal_force"][:40], -AREA * LAW["stiffness"] * barrier(gaps[:40], 0.4)[1], rtol=1e-9
     )
@@ -172,7 +172,7 @@ def test_the_barrier_grows_without_bound_and_ends_smoothly(kind) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("penalty", [False, True])
 def test_derivatives_by_the_law(kind, penalty) -> None:
-    law = LAW | {"thickness": 0.03, "penalty": penalty}
+    law = LAW | {"min_distance": 0.03, "penalty": penalty}
     x = near_ones(kind, random_pairs(kind, 200, gap=0.2), law)
     parallel = PARALLEL if kind == "edge_edge" else 0.0
     rng = np.random.default_rng(1)
@@ -183,7 +183,7 @@ def test_derivatives_by_the_law(kind, penalty) -> None:
         at = _core.pair_energies(kind, x, AREA, parallel, changed)
         return (along * at["gradient"]).sum((1, 2)) + by_force * at["normal_force"]
 
-    for column, name in enumerate(("stiffness", "reach", "thickness", "smoothing")):
+    for column, name in enumerate(("stiffness", "activation_distance", "min_distance", "smoothing")):
         step = 1e-6 * max(law[name], 0.1)
         high, low = value(law | {name: law[name] + step}), value(law | {name: law[name] - step})
         assert relative(got[:, column : column + 1], ((high - low) / (2 * step))[:, None]) < 1e-5, name
@@ -191,7 +191,7 @@ def test_derivatives_by_the_law(kind, penalty) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_of_friction(kind) -> None:
-    law = LAW | {"thickness": 0.03}
+    law = LAW | {"min_distance": 0.03}
     x = near_ones(kind, random_pairs(kind, 300, gap=0.15), law)
     parallel = PARALLEL if kind == "edge_edge" else 0.0
     rng = np.random.default_rng(2)
@@ -274,14 +274,17 @@ def test_static_friction_falls_to_the_kinetic_one() -> None:
 
 def test_contact_law_of_neighbours_fits_the_room_between_them() -> None:
     x = near_ones("point_triangle", random_pairs("point_triangle", 200, gap=0.1), LAW)
-    law, small = LAW | {"thickness": 0.02}, LAW | {"thickness": 0.01, "reach": 0.2, "smoothing": 0.05}
+    law, small = (
+        LAW | {"min_distance": 0.02},
+        LAW | {"min_distance": 0.01, "activation_distance": 0.2, "smoothing": 0.05},
+    )
     halved = _core.pair_energies("point_triangle", x, AREA, 0.0, law, room=0.21)
     expected = _core.pair_energies("point_triangle", x, AREA, 0.0, small)
     assert relative(halved["gradient"], expected["gradient"]) < 1e-10
     rng = np.random.default_rng(1)
     along, none = rng.standard_normal((len(x), 4, 3)), np.zeros(len(x))
     got = _core.pair_energies_by_law("point_triangle", x, AREA, 0.0, law, along, none, room=0.21)
-    for column, name in ((1, "reach"), (2, "thickness")):
+    for column, name in ((1, "activation_distance"), (2, "min_distance")):
         high, low = (
             (
                 along

@@ -3,7 +3,13 @@
 import numpy as np
 
 KINDS = ("point_triangle", "edge_edge")
-LAW = {"stiffness": 2.0e3, "reach": 0.4, "thickness": 0.0, "smoothing": 0.1, "penalty": False}  # Pa, m
+LAW = {
+    "stiffness": 2.0e3,
+    "activation_distance": 0.4,
+    "min_distance": 0.0,
+    "smoothing": 0.1,
+    "penalty": False,
+}  # Pa, m
 
 
 def random_pairs(kind, count, seed=0, gap=None):

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "bindings/arrays.h"
-#include "bindings/testing/testing.h"
+#include "bindings/bindings.h"
 #include "magshell/contact/broad_phase.h"
 #include "magshell/contact/continuous.h"
 #include "magshell/contact/pair_friction.h"
@@ -70,8 +70,8 @@ Pairs pairs_of(const std::string& kind, double area, double parallel, const py::
     pairs.pair.area = area;
     pairs.pair.parallel = parallel;
     pairs.pair.room = room;
-    pairs.law = {law["stiffness"].cast<double>(), law["reach"].cast<double>(),
-                 law["thickness"].cast<double>(), law["smoothing"].cast<double>(),
+    pairs.law = {law["stiffness"].cast<double>(), law["activation_distance"].cast<double>(),
+                 law["min_distance"].cast<double>(), law["smoothing"].cast<double>(),
                  law["penalty"].cast<bool>()};
     return pairs;
 }
@@ -150,7 +150,7 @@ Array by_law(const std::string& kind, const Array& places, double area, double p
         const PairEnergy at(with.pair, x[k], with.law);
         PairEnergy::ByLaw by;
         if (at.acts()) by = at.vjp(along[k], by_normal_force.data()[k]);
-        const double numbers[4] = {by.stiffness, by.reach, by.thickness, by.smoothing};
+        const double numbers[4] = {by.stiffness, by.activation_distance, by.min_distance, by.smoothing};
         std::copy_n(numbers, 4, out.mutable_data(k, 0));
     }
     return out;
@@ -274,12 +274,12 @@ void register_contact_pairs(py::module_& module) {
         py::arg("room") = std::numeric_limits<double>::infinity(),
         "energy (n,), gradient (n, 4, 3), hessian (n, 12, 12), normal_force (n,) and normal_force_by_place "
         "(n, 4, 3) of pairs with nodes at (n, 4, 3) [m].");
-    module.def(
-        "pair_energies_by_law", &by_law, py::arg("kind"), py::arg("places"), py::arg("area"),
-        py::arg("parallel"), py::arg("law"), py::arg("lambda_"), py::arg("by_normal_force"),
-        py::arg("room") = std::numeric_limits<double>::infinity(),
-        "Derivatives of lambda . gradient + by_normal_force * normal_force by stiffness, reach, thickness, "
-        "smoothing: (n, 4).");
+    module.def("pair_energies_by_law", &by_law, py::arg("kind"), py::arg("places"), py::arg("area"),
+               py::arg("parallel"), py::arg("law"), py::arg("lambda_"), py::arg("by_normal_force"),
+               py::arg("room") = std::numeric_limits<double>::infinity(),
+               "Derivatives of lambda . gradient + by_normal_force * normal_force by stiffness, "
+               "activation_distance, min_distance, "
+               "smoothing: (n, 4).");
     module.def(
         "pair_sums", &sums, py::arg("kind"), py::arg("places"), py::arg("area"), py::arg("parallel"),
         py::arg("law"), py::arg("cautious") = false,

@@ -2,7 +2,7 @@
 #include <optional>
 
 #include "bindings/arrays.h"
-#include "bindings/testing/testing.h"
+#include "bindings/bindings.h"
 #include "magshell/linalg/multifrontal/assembly_plan.h"
 #include "magshell/linalg/ordering/ordering.h"
 

@@ -3,8 +3,7 @@
 #include <string>
 
 #include "bindings/arrays.h"
-#include "bindings/given_away.h"
-#include "bindings/testing/testing.h"
+#include "bindings/bindings.h"
 #include "magshell/core/errors.h"
 #include "magshell/core/simd_functions.h"
 #include "magshell/linalg/krylov/operator_factor.h"

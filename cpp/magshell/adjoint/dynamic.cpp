@@ -198,7 +198,7 @@ class Backward {
                 const double a = tableau.a[i][j];
                 by_v[j] += (dt * a) * by.x_hat;
                 by_w[j] += (dt * a) * by.v_hat;
-                by_dt += a * (at.all[j].v.dot(by.x_hat) + at.all[j].w.dot(by.v_hat));
+                by_dt += a * (at.all[j].v.dot(by.x_hat) + at.all[j].acceleration.dot(by.v_hat));
             }
             by_x.setZero(model_.size());
         }

@@ -142,7 +142,7 @@ class ForwardSweep {
             tangent_.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
         }
         if (!explicit_first) return;
-        tangent_.rates.w = VectorXd::Zero(q.size());
+        tangent_.rates.acceleration = VectorXd::Zero(q.size());
         if (start.rates.c.size() > 0) tangent_.rates.c = VectorXd::Zero(q.size());
         tangent_.rates.elastic.d = model_.elastic().zeros();
         tangent_.rates.elastic.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
@@ -198,14 +198,14 @@ class ForwardSweep {
                     flight_at(t, algebra.tableau(), algebra.dt(), dt_tangent, begin, bodies);
                 StageRates rates;
                 rates.v = last.v + t * tangent.v;
-                rates.w = last.w + t * tangent.w;
+                rates.acceleration = last.acceleration + t * tangent.acceleration;
                 flight.finish(q + t * q_tangent, rates);
-                return joined({rates.v, rates.w});
+                return joined({rates.v, rates.acceleration});
             },
             ends, step_of_flight(algebra.dt(), dt_tangent, begin),
             std::array{largest(last.v), largest(last.v) / algebra.dt()}, "the end of a free flight");
         tangent.v = both.head(size);
-        tangent.w = both.tail(size);
+        tangent.acceleration = both.tail(size);
     }
 
     // Returns (H + W) times a change of the state evaluated last.
@@ -353,7 +353,7 @@ class ForwardSweep {
             for (std::size_t j = 0; j < tangents.size(); ++j) {
                 const double a = tableau.a[i][j];
                 x_hat_tangent += a * (dt * tangents[j].v + dt_tangent * at.all[j].v);
-                v_hat_tangent += a * (dt * tangents[j].w + dt_tangent * at.all[j].w);
+                v_hat_tangent += a * (dt * tangents[j].acceleration + dt_tangent * at.all[j].acceleration);
             }
             if (flight.size() > 0) {
                 x_hat_tangent += flight.segment(2 * i * size, size);
@@ -397,10 +397,10 @@ class ForwardSweep {
             StageRates& now = tangents.emplace_back();
             now.v = VectorXd::Zero(size);
             now.v.head(coordinates) = (q_tangent - x_hat_tangent - T_tangent * v).head(coordinates) / T;
-            now.w = (now.v - v_hat_tangent - T_tangent * w) / T;
+            now.acceleration = (now.v - v_hat_tangent - T_tangent * w) / T;
             if (tableau.implicit_contact) {
                 now.c = contact_tangent(stage, q, q_tangent, forces.contact, record.stages[i].contact);
-                now.w -= stage.contact_factor * now.c;
+                now.acceleration -= stage.contact_factor * now.c;
             }
             if (!strains.idle())
                 strains.finish(model_.elastic().strains(q),

@@ -28,10 +28,10 @@ Eigen::MatrixXd LowRank::columns(Index size) const {
     return all;
 }
 
-Eigen::MatrixXd LowRank::reduced(const DofMap& reduction, Index size) const {
+Eigen::MatrixXd LowRank::reduced(const DofMap& dof_map, Index size) const {
     const Eigen::MatrixXd all = columns(size);
-    Eigen::MatrixXd free(reduction.size(), all.cols());
-    for (Index c = 0; c < all.cols(); ++c) free.col(c) = reduction.vector(all.col(c));
+    Eigen::MatrixXd free(dof_map.size(), all.cols());
+    for (Index c = 0; c < all.cols(); ++c) free.col(c) = dof_map.vector(all.col(c));
     return free;
 }
 

@@ -28,7 +28,7 @@ class LowRank {
     /// Returns the vectors u as columns, with `size` rows.
     Eigen::MatrixXd columns(Index size) const;
     /// Returns the vectors u as columns, of the free dofs.
-    Eigen::MatrixXd reduced(const DofMap& reduction, Index size) const;
+    Eigen::MatrixXd reduced(const DofMap& dof_map, Index size) const;
     VectorXd stiffness() const;
 
   private:

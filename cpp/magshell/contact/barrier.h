@@ -20,33 +20,33 @@ namespace magshell {
 
 /// The parameters that all pairs of a contact share.
 struct BarrierLaw {
-    double stiffness = 0.0;  // [Pa]
-    double reach = 0.0;      // activation distance r [m], > 0
-    double thickness = 0.0;  // minimum separation d_min [m]: the distance where the gap is zero
-    double smoothing = 0.0;  // [m] of the penalty, > 0
-    bool penalty = false;    // false: barrier
+    double stiffness = 0.0;            // [Pa]
+    double activation_distance = 0.0;  // r [m], > 0
+    double min_distance = 0.0;         // d_min [m]: the distance where the gap is zero
+    double smoothing = 0.0;            // [m] of the penalty, > 0
+    bool penalty = false;              // false: barrier
 };
 
 /// b and its derivatives at a gap [m], for unit stiffness. Infinite for a barrier without a gap.
 struct Barrier {
-    double energy = 0.0, slope = 0.0, curvature = 0.0;   // b [m], db/dg, d2b/dg2 [1/m]
-    double energy_by_reach = 0.0, slope_by_reach = 0.0;  // at constant gap
+    double energy = 0.0, slope = 0.0, curvature = 0.0;  // b [m], db/dg, d2b/dg2 [1/m]
+    double energy_by_activation_distance = 0.0, slope_by_activation_distance = 0.0;  // at constant gap
     double energy_by_smoothing = 0.0, slope_by_smoothing = 0.0;
 
     Barrier(double gap, const BarrierLaw& law) {
-        const double per_reach = 1.0 / law.reach, y = gap * per_reach, rest = 1.0 - y;
+        const double r = law.activation_distance, per_r = 1.0 / r, y = gap * per_r, rest = 1.0 - y;
         if (rest <= 0.0) return;
         if (law.penalty) {
-            const Penalty at(law.reach - gap, law.smoothing);
-            energy = per_reach * at.energy;
-            slope = -per_reach * at.force;
-            curvature = per_reach * at.stiffness;
-            energy_by_reach = per_reach * (at.force - energy);
-            slope_by_reach = -per_reach * (at.stiffness + slope);
+            const Penalty at(r - gap, law.smoothing);
+            energy = per_r * at.energy;
+            slope = -per_r * at.force;
+            curvature = per_r * at.stiffness;
+            energy_by_activation_distance = per_r * (at.force - energy);
+            slope_by_activation_distance = -per_r * (at.stiffness + slope);
             // S = e^2 s(depth/e) with s homogeneous: S_e = (2 S - depth S')/e
-            const double depth = law.reach - gap;
-            energy_by_smoothing = per_reach * (2.0 * at.energy - depth * at.force) / law.smoothing;
-            slope_by_smoothing = -per_reach * at.force_by_smoothing;
+            const double depth = r - gap;
+            energy_by_smoothing = per_r * (2.0 * at.energy - depth * at.force) / law.smoothing;
+            slope_by_smoothing = -per_r * at.force_by_smoothing;
             return;
         }
         if (!(y > 0.0)) {
@@ -58,11 +58,11 @@ struct Barrier {
         const double log = std::log(y), ratio = rest / y;
         const double value = -rest * rest * log, first = rest * (2.0 * log - ratio);
         const double second = -2.0 * log + ratio * (4.0 + ratio);
-        energy = law.reach * value;
+        energy = r * value;
         slope = first;
-        curvature = per_reach * second;
-        energy_by_reach = value - y * first;
-        slope_by_reach = -y * per_reach * second;
+        curvature = per_r * second;
+        energy_by_activation_distance = value - y * first;
+        slope_by_activation_distance = -y * per_r * second;
     }
 };
 

@@ -1,15 +1,135 @@
 #include "magshell/contact/broad_phase.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 #include <tuple>
+#include <vector>
 
-#include "magshell/contact/edge_through_triangle.h"
 #include "magshell/contact/neighbours.h"
-#include "magshell/contact/overcount_correction.h"
+#include "magshell/contact/pair_energy.h"
+#include "magshell/contact/proximity.h"
 #include "magshell/core/parallel.h"
+#include "magshell/core/types.h"
 
 namespace magshell {
 namespace {
+
+// [-] Relative round-off of a signed volume; fixed by test_crossings_are_those_of_ipctk
+constexpr double round_off = 16.0 * std::numeric_limits<double>::epsilon();
+
+/// Returns the side of the plane through a, b, c on which a point is: 1, -1, or 0 if round-off leaves it open.
+int side(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& point) {
+    const Vec3 one = a - point, two = b - point, three = c - point;
+    const double volume = one.dot(two.cross(three));
+    const double bound =
+        round_off *
+        one.cwiseAbs().dot(Vec3(two.y() * three.z(), two.z() * three.x(), two.x() * three.y()).cwiseAbs() +
+                           Vec3(two.z() * three.y(), two.x() * three.z(), two.y() * three.x()).cwiseAbs());
+    return volume > bound ? 1 : volume < -bound ? -1 : 0;
+}
+
+/// Returns true if an edge and a triangle intersect, also if they are so close that round-off leaves it open.
+bool passes_through(const std::array<Vec3, 2>& edge, const std::array<Vec3, 3>& triangle) {
+    const auto& [a, b, c] = triangle;
+    const int at_begin = side(a, b, c, edge[0]), at_end = side(a, b, c, edge[1]);
+    if (at_begin * at_end > 0) return false;
+    int least = 1, most = -1;
+    bool certain = at_begin != 0 && at_end != 0;
+    for (int k = 0; k < 3; ++k) {
+        const int turn = side(edge[0], edge[1], triangle[k], triangle[(k + 1) % 3]);
+        least = std::min(least, turn);
+        most = std::max(most, turn);
+        certain = certain && turn != 0;
+    }
+    if (least < 0 && most > 0) return false;
+    if (certain) return true;
+    // Here an end is near the plane, or the edge near a side of the triangle, or all of it near one plane: the
+    // distance decides.
+    double distance = std::numeric_limits<double>::infinity(), size = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        distance = std::min(distance, pair_distance(PairKind::edge_edge,
+                                                    {edge[0], edge[1], triangle[k], triangle[(k + 1) % 3]}));
+        size = std::max(size, triangle[k].cwiseAbs().maxCoeff());
+    }
+    for (const Vec3& end : edge) {
+        distance = std::min(distance, pair_distance(PairKind::point_triangle, {end, a, b, c}));
+        size = std::max(size, end.cwiseAbs().maxCoeff());
+    }
+    return distance <= round_off * size;
+}
+
+/// A vertex or an edge of one of the triangles near a point.
+struct Shared {
+    std::array<Index, 2> nodes;  // lower first; twice the same for a vertex
+    std::size_t from;            // index of the pair
+
+    bool operator<(const Shared& other) const { return nodes < other.nodes; }
+};
+
+/// Calls visit(first, count) for each group of equal entries.
+template <class Visit>
+void each_group(const std::vector<Shared>& all, const Visit& visit) {
+    for (std::size_t k = 0, after; k < all.size(); k = after) {
+        for (after = k + 1; after < all.size() && all[after].nodes == all[k].nodes;) ++after;
+        visit(k, static_cast<int>(after - k));
+    }
+}
+
+/// Adds correction pairs to `all` for the pairs of a point and a triangle from `first` on: pairs of the same
+/// point with the edges and vertices that its triangles share, if they are closer than `margin` [m] with nodes
+/// at q. The pairs of one point must be consecutive.
+///
+/// It counts triangles minus shared edges plus vertices, which is 1 for any region of a surface without holes
+/// (Euler characteristic). Neighbouring parts with a reduced activation distance do not count, because each has
+/// a law of its own.
+void add_overcount_corrections(std::size_t first, const double* q, double margin,
+                               std::vector<NearPair>& all) {
+    std::vector<Shared> edges, vertices;
+    std::vector<int> shared;  // number of shared edges at each vertex, at its first entry
+    const auto add = [&](const Shared& shared, PairKind kind, int times) {
+        NearPair near = all[shared.from];
+        near.pair.kind = kind;
+        near.pair.area *= times;
+        near.pair.nodes = {near.pair.nodes[0], shared.nodes[0],
+                           kind == PairKind::point_edge ? shared.nodes[1] : -1, -1};
+        if (pair_distance(kind, positions_of(near.pair, q)) < margin) all.push_back(near);
+    };
+    const std::size_t end = all.size();
+    for (std::size_t begin = first, next; begin < end; begin = next) {
+        const Index point = all[begin].pair.nodes[0];
+        for (next = begin + 1; next < end && all[next].pair.nodes[0] == point;) ++next;
+        if (next == begin + 1) continue;
+        edges.clear();
+        vertices.clear();
+        for (std::size_t k = begin; k < next; ++k) {
+            if (std::isfinite(all[k].pair.room)) continue;
+            const std::array<Index, 4>& nodes = all[k].pair.nodes;
+            for (int i = 1; i < 4; ++i) {
+                const auto [low, high] = std::minmax(nodes[i], nodes[i % 3 + 1]);
+                edges.push_back({{low, high}, k});
+                vertices.push_back({{nodes[i], nodes[i]}, k});
+            }
+        }
+        std::stable_sort(edges.begin(), edges.end());
+        std::stable_sort(vertices.begin(), vertices.end());
+        shared.assign(vertices.size(), 0);
+        const auto place_of = [&](Index node) {
+            return std::lower_bound(vertices.begin(), vertices.end(), Shared{{node, node}, 0}) -
+                   vertices.begin();
+        };
+        each_group(edges, [&](std::size_t k, int count) {
+            if (count == 1) return;
+            for (Index node : edges[k].nodes) shared[place_of(node)] += count - 1;
+            add(edges[k], PairKind::point_edge, 1 - count);
+        });
+        each_group(vertices, [&](std::size_t k, int count) {
+            const int times = 1 - count + shared[k];
+            if (times != 0) add(vertices[k], PairKind::point_point, times);
+        });
+    }
+}
 
 // [-] of the product of squared reference lengths, below which edges count as parallel
 // (contact/parallel_edges.h); fixed by test_energies_are_those_of_ipctk

@@ -20,7 +20,7 @@
 #include <optional>
 
 #include "magshell/contact/face_boxes.h"
-#include "magshell/contact/near_pair.h"
+#include "magshell/contact/pair_energy.h"
 
 namespace magshell {
 

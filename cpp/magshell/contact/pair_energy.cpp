@@ -40,9 +40,9 @@ PairEnergy::PairEnergy(const ContactPair& pair, const PairPositions& x, const Ba
     : pair_(pair),
       distance_scale_(pair.distance_scale(law)),
       law_(pair.scaled(law)),
-      acts_(proximity_within(pair.kind, x, law_.reach + law_.thickness, near_)),
+      acts_(proximity_within(pair.kind, x, law_.activation_distance + law_.min_distance, near_)),
       edges_(x, acts_ && pair.kind == PairKind::edge_edge ? pair.parallel : 0.0),
-      barrier_(acts_ ? near_.distance - law_.thickness : law_.reach, law_) {
+      barrier_(acts_ ? near_.distance - law_.min_distance : law_.activation_distance, law_) {
     const double scale = pair.area * law.stiffness;
     energy_ = scale * barrier_.energy;
     slope_ = scale * barrier_.slope;
@@ -157,7 +157,8 @@ PairEnergy::ByLaw PairEnergy::vjp_of_own_law(const Rates& rates) const {
                  turning = edges_.acts ? edges_.slope * rates.parallel : 0.0;
     const double area = pair_.area, scale = area * law_.stiffness;
     return {area * (along * barrier_.slope + turning * barrier_.energy),
-            scale * (along * barrier_.slope_by_reach + turning * barrier_.energy_by_reach),
+            scale * (along * barrier_.slope_by_activation_distance +
+                     turning * barrier_.energy_by_activation_distance),
             -scale * (along * barrier_.curvature + turning * barrier_.slope),
             scale * (along * barrier_.slope_by_smoothing + turning * barrier_.energy_by_smoothing)};
 }
@@ -167,11 +168,11 @@ PairEnergy::ByLaw PairEnergy::vjp(const PairVectors& lambda, double by_normal_fo
     if (distance_scale_ < 1.0) {
         // The pair's own distances are those of the law times room / (activation distance + minimum
         // separation).
-        const double both = law_.reach + law_.thickness;
-        const double by_share =
-            by.reach * law_.reach + by.thickness * law_.thickness + by.smoothing * law_.smoothing;
-        by.reach = distance_scale_ * (by.reach - by_share / both);
-        by.thickness = distance_scale_ * (by.thickness - by_share / both);
+        const double both = law_.activation_distance + law_.min_distance;
+        const double by_share = by.activation_distance * law_.activation_distance +
+                                by.min_distance * law_.min_distance + by.smoothing * law_.smoothing;
+        by.activation_distance = distance_scale_ * (by.activation_distance - by_share / both);
+        by.min_distance = distance_scale_ * (by.min_distance - by_share / both);
         by.smoothing *= distance_scale_;
     }
     return by;
@@ -190,7 +191,8 @@ PairEnergy::ByPair PairEnergy::pair_vjp(const PairVectors& lambda, double by_nor
                       energy_ * along.parallel * (4.0 * y - 2.0) / (e * e);
     }
     if (distance_scale_ < 1.0)
-        of.room = (by.reach * law_.reach + by.thickness * law_.thickness + by.smoothing * law_.smoothing) /
+        of.room = (by.activation_distance * law_.activation_distance + by.min_distance * law_.min_distance +
+                   by.smoothing * law_.smoothing) /
                   pair_.room;
     return of;
 }

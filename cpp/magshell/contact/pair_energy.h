@@ -32,14 +32,14 @@ struct ContactPair {
 
     /// Returns the factor by which the law's distances are scaled down for this pair.
     double distance_scale(const BarrierLaw& law) const {
-        const double both = law.reach + law.thickness;
+        const double both = law.activation_distance + law.min_distance;
         return both > room ? room / both : 1.0;
     }
     /// Returns the law with the scaled distances.
     BarrierLaw scaled(BarrierLaw law) const {
         const double s = distance_scale(law);
-        law.reach *= s;
-        law.thickness *= s;
+        law.activation_distance *= s;
+        law.min_distance *= s;
         law.smoothing *= s;
         return law;
     }
@@ -80,7 +80,7 @@ class PairEnergy {
     /// The gradient with respect to the law of lambda . gradient plus a function of the normal force, whose derivative is
     /// `by_normal_force`.
     struct ByLaw {
-        double stiffness = 0.0, reach = 0.0, thickness = 0.0, smoothing = 0.0;
+        double stiffness = 0.0, activation_distance = 0.0, min_distance = 0.0, smoothing = 0.0;
     };
     ByLaw vjp(const PairVectors& lambda, double by_normal_force = 0.0) const;
 
@@ -109,6 +109,15 @@ class PairEnergy {
     ParallelEdges edges_;
     Barrier barrier_;
     double energy_ = 0.0, slope_ = 0.0, curvature_ = 0.0;  // of A k b
+};
+
+struct NearPair {
+    Index contact = 0;  // index of the SurfacePair
+    ContactPair pair;
+    Index first_face = 0, second_face = 0;  // a face of each part, numbered in its surface
+    bool swapped = false;                   // true: the first part belongs to surface b
+
+    bool operator==(const NearPair&) const = default;
 };
 
 }  // namespace magshell

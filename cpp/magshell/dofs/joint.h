@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "magshell/core/parameters.h"
 #include "magshell/core/types.h"
 #include "magshell/energy/joint_law.h"
 
@@ -145,6 +146,10 @@ struct Joint {
     bool has_axis() const { return traits().has_axis; }
     /// Returns its number of degrees of freedom.
     Index freedom() const { return traits().freedom; }
+    /// Registers the numbers of its kind.
+    std::vector<ParameterSlice> add_numbers(const std::string& owner, Parameters& parameters) const;
+    /// Replaces the numbers by those of the slices that have changed. Returns true if there are any.
+    bool replace_numbers(const Values& values, const std::vector<ParameterSlice>& slices);
 };
 
 }  // namespace magshell

@@ -304,6 +304,23 @@ Vec3 JointKind::target_gradient(const Mat3&, const Vec3&, const Vec3& by_coordin
     return by_coordinates;
 }
 
+std::vector<ParameterSlice> Joint::add_numbers(const std::string& owner, Parameters& parameters) const {
+    std::vector<ParameterSlice> slices;
+    for (const auto& [name, unit] : traits().numbers)
+        slices.push_back(parameters.add(owner, name, unit, 1, 1));
+    return slices;
+}
+
+bool Joint::replace_numbers(const Values& values, const std::vector<ParameterSlice>& slices) {
+    bool replaced = false;
+    for (std::size_t n = 0; n < slices.size(); ++n) {
+        if (!values.changed(slices[n])) continue;
+        numbers[n] = values.number(slices[n]);
+        replaced = true;
+    }
+    return replaced;
+}
+
 void JointKind::undefined(const char* function) const {
     throw std::logic_error("a " + std::string(traits_.name) + " joint has no " + function);
 }

@@ -202,8 +202,7 @@ void SkeletonCoordinates::set_values(const Values& values) {
     for (Index k = 0; k < n_links(); ++k) {
         if (slices_[k].origin.size() > 0) joints_[k].origin = values.vector(slices_[k].origin);
         if (slices_[k].axis.size() > 0) joints_[k].axis = values.vector(slices_[k].axis);
-        for (std::size_t n = 0; n < slices_[k].numbers.size(); ++n)
-            joints_[k].numbers[n] = values.number(slices_[k].numbers[n]);
+        joints_[k].replace_numbers(values, slices_[k].numbers);
     }
 }
 

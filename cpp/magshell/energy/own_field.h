@@ -22,7 +22,7 @@
 //
 //   Q_t = a~_t . (M~_1 - M~_2)      a~_t: area vector at rest, out of the tetrahedron 1 into 2
 //
-// A tetrahedron whose magnetization rotates without stretching, R M~ / J, has U^-1 M~ instead of M~ (energy/unstretched_solid_vector.h),
+// A tetrahedron whose magnetization rotates without stretching, R M~ / J, has U^-1 M~ instead of M~ (energy/unstretched_vector.h),
 // with its mean deformation gradient F = R U = sum_t xbar_t a~_t^T / V~, a sum over its triangles of centers xbar_t.
 //
 // A charge is uniform on its triangle: four points, 16 where triangles or edges are near, and the closed form of its energy with itself.

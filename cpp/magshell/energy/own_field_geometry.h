@@ -9,7 +9,6 @@
 #include "magshell/energy/own_field.h"
 #include "magshell/energy/own_field_pairs.h"
 #include "magshell/energy/source_tree.h"
-#include "magshell/energy/unstretched_solid_vector.h"
 #include "magshell/energy/unstretched_vector.h"
 #include "magshell/field/dipoles.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "magshell/core/errors.h"
-#include "magshell/obstacle/parallel_surface.h"
+#include "magshell/obstacle/obstacle.h"
 #include "magshell/obstacle/spline_grid.h"
 
 namespace magshell {

@@ -7,9 +7,8 @@
 
 #include "magshell/core/errors.h"
 #include "magshell/core/parallel.h"
-#include "magshell/obstacle/parallel_surface.h"
+#include "magshell/obstacle/obstacle.h"
 #include "magshell/obstacle/spline_grid.h"
-#include "magshell/obstacle/swept_ball.h"
 #include "magshell/obstacle/triangle_tree.h"
 
 namespace magshell {

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "magshell/mesh/triangle_mesh.h"
-#include "magshell/obstacle/box.h"
 #include "magshell/obstacle/obstacle.h"
+#include "magshell/obstacle/simple_shapes.h"
 
 namespace magshell {
 

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "magshell/core/errors.h"
-#include "magshell/obstacle/swept_ball.h"
+#include "magshell/obstacle/obstacle.h"
 
 namespace magshell {
 namespace {

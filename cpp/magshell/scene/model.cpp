@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "magshell/assembly/rough_hessian_operator.h"
+#include "magshell/assembly/hessian_operator.h"
 #include "magshell/core/errors.h"
 #include "magshell/dofs/skeleton_coordinates.h"
 #include "magshell/linalg/krylov/operator_factor.h"
@@ -61,7 +61,7 @@ ReducedCoordinatesList reduced_coordinates_of(const Bodies& bodies, const SceneI
             if (joint.has_motor) slices[k].motor = add(kind.motor.name, kind.motor.unit, kind.freedom);
             slices[k].origin = add("origin", "m", 3);
             if (kind.has_axis) slices[k].axis = add("axis", "1", 3);
-            for (const auto& [name, unit] : kind.numbers) slices[k].numbers.push_back(add(name, unit, 1));
+            slices[k].numbers = joint.add_numbers(skeleton.labels[k], registry.values);
         }
         all.push_back(
             std::make_unique<SkeletonCoordinates>(std::move(links), skeleton.joints, std::move(slices)));

@@ -1,11 +1,36 @@
 // ModelParameters: the parameters of a scene: their layout, their values, and derivatives with respect to them.
 #pragma once
 
+#include <vector>
+
+#include "magshell/core/parameters.h"
 #include "magshell/dofs/dof_map.h"
 #include "magshell/scene/scene_terms.h"
-#include "magshell/scene/time_varying.h"
 
 namespace magshell {
+
+// Parameters that change during a solve, such as the position of a magnet over the time of a motion.
+//
+// During such a solve they are load parameters: their numbers are appended to the registered ones in every vector of load parameters.
+class TimeVaryingParameters {
+  public:
+    TimeVaryingParameters() = default;
+    /// entries: indices of registered values, each once. Throws InvalidInput if one cannot vary.
+    TimeVaryingParameters(const Registry& registry, const std::vector<Index>& entries);
+
+    bool empty() const { return slices_.empty(); }
+    /// Returns the total number of components.
+    Index size() const { return size_; }
+
+    /// Copies the numbers from load parameters into the vector of all values. Returns true if any of them changed.
+    bool update(const LoadParameters& load_parameters, VectorXd& values) const;
+    /// Moves the gradient with respect to these values to the gradient with respect to load parameters.
+    void move_gradient(Gradient& gradient) const;
+
+  private:
+    std::vector<ParameterSlice> slices_;  // positions among the values
+    Index first_ = 0, size_ = 0;
+};
 
 class ModelParameters {
   public:

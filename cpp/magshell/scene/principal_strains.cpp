@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "magshell/scene/shell_loops.h"
-#include "magshell/scene/six_node_stresses.h"
+#include "magshell/scene/shell_stresses.h"
 #include "magshell/terms/shell/bending_term.h"
 #include "magshell/terms/shell/membrane_term.h"
 

@@ -31,12 +31,11 @@ bool is_one_of(const auto& term) {
 // Returns true if add_rest_vjp() is complete for a term: it has the derivatives, or reads no rest shape, as terms whose
 // forces follow from present positions and from values that the caller computes.
 bool rest_gradient_is_complete(const Term& term) {
-    if (const auto* const shaped = dynamic_cast<const RestShapeTerm*>(&term))
-        return shaped->has_rest_gradient();
     if (const auto* const moments = dynamic_cast<const EdgeMomentTerm*>(&term))
         return !moments->reads_rest_lengths();
-    return is_one_of<LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>, GroupEnergyTerm,
-                     SpringTerm, MomentTerm, BodyForceTerm, TorqueTerm, JointTerm, DamperTerm>(term);
+    return is_one_of<RestShapeTerm, LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>,
+                     GroupEnergyTerm, SpringTerm, MomentTerm, BodyForceTerm, TorqueTerm, JointTerm,
+                     DamperTerm>(term);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 
 #include "magshell/energy/material.h"
 #include "magshell/scene/shell_loops.h"
-#include "magshell/scene/six_node_stresses.h"
 #include "magshell/terms/shell/bending_term.h"
 #include "magshell/terms/shell/membrane_term.h"
 

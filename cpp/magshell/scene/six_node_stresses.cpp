@@ -1,8 +1,7 @@
-#include "magshell/scene/six_node_stresses.h"
-
 #include <Eigen/LU>
 #include <cmath>
 
+#include "magshell/scene/shell_stresses.h"
 #include "magshell/strain/six_nodes.h"
 #include "magshell/terms/shell6/bending_six_term.h"
 #include "magshell/terms/shell6/membrane_six_term.h"

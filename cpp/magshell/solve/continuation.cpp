@@ -73,7 +73,7 @@ class Follower {
             if (!advance(tangent)) return false;
             const PathPoint& last = result_.points.back();
             if (until_ && until_(last)) return true;
-            if (last.parameter >= options_.highest_parameter || last.parameter <= options_.lowest_parameter)
+            if (last.parameter >= options_.max_parameter || last.parameter <= options_.min_parameter)
                 return true;
         }
         return fail("the path reached max_points = " + std::to_string(options_.max_points) +
@@ -89,7 +89,7 @@ class Follower {
         here.angle_branches = model_.angle_branches();
         if (!find_tangent(here, tangent)) return fail("the tangent does not exist at the start");
         here.field_sampling_error = model_.field_sampling_error(here.state, load_parameters(here.parameter));
-        psi_ = std::max(length(tangent.state), min_movement * options_.largest_step);
+        psi_ = std::max(length(tangent.state), min_movement * options_.max_step);
         normalize(tangent);
         if (tangent.parameter < 0.0) flip(tangent);
         result_.points.push_back(here);
@@ -106,7 +106,7 @@ class Follower {
         tangent = {options_.branch_side * from.mode, 0.0};
         if (!(length(tangent.state) > 0.0)) return fail("the mode of the bifurcation moves nothing");
         normalize(tangent);
-        step_ = options_.largest_step;
+        step_ = options_.max_step;
         model_.set_angle_branches(from.point.angle_branches);
         model_.evaluate(from.point.state, load_parameters(from.point.parameter));
         return true;
@@ -206,11 +206,11 @@ class Follower {
     // obstacle is passed through or rotates too far, and the path does not bend too much. Returns false if no step is short enough.
     bool advance(Tangent& tangent) {
         const PathPoint base = result_.points.back();
-        longest_ = std::max(longest_, std::min(step_, options_.largest_step));
+        longest_ = std::max(longest_, std::min(step_, options_.max_step));
         bool at_base = true;  // whether the model was last evaluated at the base point
         std::string through;  // the obstacle that the last trial step would pass through
         sides_.remember(base.state, load_parameters(base.parameter));
-        for (step_ = std::min(step_, options_.largest_step);; step_ *= 0.5, at_base = false) {
+        for (step_ = std::min(step_, options_.max_step);; step_ *= 0.5, at_base = false) {
             if (step_ < min_step_ratio * longest_) return fail(through.empty() ? describe_halt() : through);
             if (!at_base) model_.evaluate(base.state, load_parameters(base.parameter));
             PathPoint next;
@@ -255,7 +255,7 @@ class Follower {
     // Replaces a point with a path parameter outside its range by an equilibrium at the end of the range, solved from that point. Returns
     // false if the solve does not converge.
     bool end_in_range(PathPoint& point) {
-        const double end = std::clamp(point.parameter, options_.lowest_parameter, options_.highest_parameter);
+        const double end = std::clamp(point.parameter, options_.min_parameter, options_.max_parameter);
         if (end == point.parameter) return true;
         if (!newton_.solve(point.state, load_parameters(end)).converged) return false;
         point.parameter = end;

@@ -40,10 +40,10 @@ struct CriticalPoint {
 
 struct PathOptions {
     NewtonOptions newton;
-    double first_step = 0.05;    // [-] change of the path parameter in the first step
-    double largest_step = 0.02;  // [-] largest arc length: about the rms displacement over the extent
+    double first_step = 0.05;  // [-] change of the path parameter in the first step
+    double max_step = 0.02;    // [-] largest arc length: about the rms displacement over the extent
     int max_points = 1000;
-    double lowest_parameter = -1e300, highest_parameter = 1.0;  // [-] the path ends at either
+    double min_parameter = -1e300, max_parameter = 1.0;  // [-] the path ends at either
     bool locate_critical = true;                // whether to compute the critical points between path points
     std::vector<WatchedObstacle> watched = {};  // those that move
     std::optional<CriticalPoint> branch_at =

@@ -8,8 +8,6 @@ namespace magshell {
 
 class RestShapeTerm {
   public:
-    /// Returns false if the term has something without a derivative with respect to rest positions, which its solve then refuses.
-    virtual bool has_rest_gradient() const { return true; }
     /// Adds lambda . dg/dX, three numbers per node, at the last evaluated state q. The last vjp() of the term had the same arguments.
     virtual void add_rest_vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                               VectorXd& out) = 0;

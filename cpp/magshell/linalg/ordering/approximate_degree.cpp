@@ -3,12 +3,12 @@
 // without storing their pairs. A variable knows the elements that contain it, and those adjacent variables that
 // share no element with it. Variables with the same adjacency are merged into one, whose weight is the sum of
 // theirs.
-#include "magshell/linalg/ordering/approximate_degree.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <utility>
+
+#include "magshell/linalg/ordering/ordering.h"
 
 namespace magshell {
 namespace {

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "magshell/linalg/ordering/cuts.h"
-#include "magshell/linalg/ordering/separator_refinement.h"
 
 namespace magshell {
 namespace {

@@ -38,4 +38,10 @@ struct CutState {
 /// is no cut, all nodes stay on the left.
 std::vector<Index> bisect(const NodeGraph& graph, const std::vector<Index>& nodes, CutState& state);
 
+/// Refines a separator (Fiduccia and Mattheyses 1982): moves its nodes to a side, and their neighbours from the other side into it, while that makes
+/// it lighter or the sides more balanced. It also tries a few moves that make it heavier, which are undone if
+/// they lead to no improvement. Neither side grows beyond 3/5 of the nodes' weight unless it was larger before.
+void refine_separator(const NodeGraph& graph, const std::vector<Index>& nodes, std::vector<Index>& separator,
+                      CutState& state);
+
 }  // namespace magshell

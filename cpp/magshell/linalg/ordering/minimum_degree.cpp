@@ -1,10 +1,10 @@
-#include "magshell/linalg/ordering/minimum_degree.h"
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
 #include <limits>
+
+#include "magshell/linalg/ordering/ordering.h"
 
 namespace magshell {
 namespace {

@@ -1,10 +1,8 @@
-#include "magshell/linalg/ordering/nested_dissection.h"
-
 #include <algorithm>
 
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/ordering/bisection.h"
-#include "magshell/linalg/ordering/minimum_degree.h"
+#include "magshell/linalg/ordering/ordering.h"
 
 namespace magshell {
 namespace {

@@ -3,8 +3,6 @@
 #include <mutex>
 
 #include "magshell/core/errors.h"
-#include "magshell/linalg/ordering/approximate_degree.h"
-#include "magshell/linalg/ordering/nested_dissection.h"
 #ifdef MAGSHELL_HAS_CHOLMOD
 #include "magshell/linalg/cholmod_workspace.h"
 #endif

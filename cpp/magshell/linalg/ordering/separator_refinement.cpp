@@ -1,8 +1,8 @@
-#include "magshell/linalg/ordering/separator_refinement.h"
-
 #include <algorithm>
 #include <queue>
 #include <utility>
+
+#include "magshell/linalg/ordering/bisection.h"
 
 namespace magshell {
 namespace {

@@ -21,7 +21,7 @@ std::size_t bytes_of(const MotionState& state) {
     for (const StrainSet& strains : state.e) bytes += strains.bytes();
     for (const StrainSet& rates : state.rates.elastic.e) bytes += rates.bytes();
     return bytes + sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() +
-                                     state.rates.w.size() + state.rates.c.size());
+                                     state.rates.acceleration.size() + state.rates.c.size());
 }
 
 std::size_t bytes_of(const SubstepRecord& substep) {

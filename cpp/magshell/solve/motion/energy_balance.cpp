@@ -88,7 +88,7 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
         model_.evaluate(q, now);
         const StageRates& rates = at.all[j];
         sum += tableau.a[tableau.stages - 1][j] *
-               rates.v.dot(mass_.cwiseProduct(rates.w) + model_.residual().gradient);
+               rates.v.dot(mass_.cwiseProduct(rates.acceleration) + model_.residual().gradient);
     }
     if (tableau.implicit_contact) {
         const StageRates& last = at.all.back();

@@ -70,7 +70,7 @@ void FreeFlight::finish(const VectorXd& q, StageRates& last) const {
             TorqueFreeRotation::State::of(body.inverse_inertia(), end.turn, end.momentum);
         body.add(now.accelerations() -
                      flight.begin.turn * flight.rotation.at(flight.rotation.size() - 1).accelerations(),
-                 last.w);
+                 last.acceleration);
         for (const Index node : body.nodes()) last.v.segment<3>(3 * node) = end.velocity;
         body.add(now.velocities(), last.v);
     }

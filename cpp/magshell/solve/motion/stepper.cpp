@@ -23,7 +23,7 @@ void StepAlgebra::start_of_stage(int i, const MotionState& begin, const std::vec
     v_hat = begin.v;
     for (std::size_t j = 0; j < rates.size(); ++j) {
         x_hat += (dt_ * tableau_.a[i][j]) * rates[j].v;
-        v_hat += (dt_ * tableau_.a[i][j]) * rates[j].w;
+        v_hat += (dt_ * tableau_.a[i][j]) * rates[j].acceleration;
     }
 }
 
@@ -31,8 +31,8 @@ void StepAlgebra::finish_stage(int i, const VectorXd& q, const VectorXd& x_hat, 
                                Index coordinates, StageRates& rates) const {
     rates.v = VectorXd::Zero(q.size());
     rates.v.head(coordinates) = (q - x_hat).head(coordinates) / stage_time_;
-    rates.w = stage_acceleration(rates, v_hat);
-    if (rates.c.size() > 0) rates.w -= tableau_.contact_factor(i) * rates.c;
+    rates.acceleration = stage_acceleration(rates, v_hat);
+    if (rates.c.size() > 0) rates.acceleration -= tableau_.contact_factor(i) * rates.c;
 }
 
 VectorXd StepAlgebra::target(const VectorXd& x_hat, const VectorXd& v_hat) const {

@@ -48,10 +48,10 @@ struct StrainRates {
     MaxwellStrains e;
 };
 
-/// Rates at a stage: of positions, velocities, elastic strains, and strains of joint dampers. If contact is implicit (tableau.h), w is the
-/// acceleration without contact, and c that of contact and friction; else c is empty.
+/// Rates at a stage: of positions, velocities, elastic strains, and strains of joint dampers. If contact is implicit (tableau.h), the
+/// acceleration is that without contact, and c that by contact and friction; else c is empty.
 struct StageRates {
-    VectorXd v, w, c = {};
+    VectorXd v, acceleration, c = {};
     StrainRates elastic, joints;
 
     bool empty() const { return v.size() == 0; }

@@ -48,13 +48,13 @@ bool BodyContactTerm::set_values(const Values& values) {
         BarrierLaw& law = laws_[c];
         stiffness_[c] = values.number(slices.stiffness);
         law.stiffness = factor_ * stiffness_[c];
-        law.reach = values.number(slices.reach);
-        law.thickness = values.number(slices.distance);
+        law.activation_distance = values.number(slices.activation_distance);
+        law.min_distance = values.number(slices.min_distance);
         law.smoothing = values.number(slices.smoothing);
         friction_[c] = {values.number(slices.kinetic), values.number(slices.fixed),
                         values.number(slices.sticking_speed)};
-        if (!law.penalty) least_[c] = law.thickness;  // a penalty allows smaller distances
-        distances.push_back(law.reach + law.thickness);
+        if (!law.penalty) least_[c] = law.min_distance;  // a penalty allows smaller distances
+        distances.push_back(law.activation_distance + law.min_distance);
     }
     candidates_.set_distances(distances);
     found_.clear();
@@ -152,7 +152,8 @@ std::vector<BodyContactTerm::HardContactPair> BodyContactTerm::hard_contact_pair
         const Proximity at = proximity(near.pair.kind, x);
         if (edges && at.free < 2) continue;
         const BarrierLaw law = near.pair.scaled(laws_[near.contact]);
-        hard.push_back({near, at, at.distance - law.reach - law.thickness, friction_[near.contact].kinetic});
+        hard.push_back({near, at, at.distance - law.activation_distance - law.min_distance,
+                        friction_[near.contact].kinetic});
     }
     return hard;
 }
@@ -255,8 +256,8 @@ void BodyContactTerm::add_vjp(const ActiveContact& active, const PairEnergy::ByL
                               const FrictionLaw& by_friction, double factor, VectorXd& by_values) const {
     const ParameterSlices& slices = slices_[active.near.contact];
     by_values[slices.stiffness.first] += factor * by.stiffness;
-    by_values[slices.reach.first] += by.reach;
-    by_values[slices.distance.first] += by.thickness;
+    by_values[slices.activation_distance.first] += by.activation_distance;
+    by_values[slices.min_distance.first] += by.min_distance;
     by_values[slices.smoothing.first] += by.smoothing;
     by_values[slices.kinetic.first] += by_friction.kinetic;
     by_values[slices.fixed.first] += by_friction.fixed;

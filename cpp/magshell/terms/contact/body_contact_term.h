@@ -129,7 +129,8 @@ class BodyContactTerm final : public Term, public RestShapeTerm {
 
   private:
     struct ParameterSlices {
-        ParameterSlice stiffness, reach, distance, smoothing, kinetic, fixed, sticking_speed;
+        ParameterSlice stiffness, activation_distance, min_distance, smoothing, kinetic, fixed,
+            sticking_speed;
     };
 
     using ActiveContacts = std::shared_ptr<const std::vector<ActiveContact>>;

@@ -13,9 +13,7 @@ DamperTerm::DamperTerm(const std::vector<Input>& joints, const std::vector<Vec3>
         const double reach = length ? links.reach() : 1.0 + links.reach() / links.length();
         const ParameterSlice axis =
             input.joint.has_axis() ? registry.values.add(input.owner, "axis", "1", 1, 3) : ParameterSlice{};
-        std::vector<ParameterSlice> numbers;
-        for (const auto& [name, unit] : input.joint.traits().numbers)
-            numbers.push_back(registry.values.add(input.owner, name, unit, 1, 1));
+        const std::vector<ParameterSlice> numbers = input.joint.add_numbers(input.owner, registry.values);
         std::size_t number = 0;
         for (const JointStrain& strain : input.joint.kind->damped(input.joint)) {
             const JointForm form(strain.coordinate, input.joint.origin, links);
@@ -32,14 +30,9 @@ bool DamperTerm::set_values(const Values& values) {
     for (Each& each : each_) {
         changed |= values.changed(each.slice);
         each.damping = each.share * values.number(each.slice);
-        bool other_form = false;
+        bool other_form = each.joint.replace_numbers(values, each.numbers);
         if (each.axis.size() > 0 && values.changed(each.axis)) {
             each.joint.axis = values.vector(each.axis);
-            other_form = true;
-        }
-        for (std::size_t n = 0; n < each.numbers.size(); ++n) {
-            if (!values.changed(each.numbers[n])) continue;
-            each.joint.numbers[n] = values.number(each.numbers[n]);
             other_form = true;
         }
         if (!other_form) continue;

@@ -44,9 +44,7 @@ JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& 
                 each.geometry = add("target_rotation", "rad", 3);
             else if (each.act == Act::cone || joint.has_axis())
                 each.geometry = add("axis", "1", 3);
-            if (each.act == Act::coordinate)
-                for (const auto& [name, unit] : joint.traits().numbers)
-                    each.numbers.push_back(add(name, unit, 1));
+            if (each.act == Act::coordinate) each.numbers = joint.add_numbers(input.owner, registry.values);
             const JointCoordinate own = joint.kind->form(joint);
             each.top = each.act == Act::cone ? 1.0 : own.top;
             each.cosine = each.act == Act::cone ? 1.0 : own.cosine;
@@ -81,12 +79,7 @@ bool JointTerm::set_values(const Values& values) {
         const auto number = [&](int k) {
             return each.slices[k].size() > 0 ? values.number(each.slices[k]) : 0.0;
         };
-        bool other_form = false;
-        for (std::size_t n = 0; n < each.numbers.size(); ++n) {
-            if (!values.changed(each.numbers[n])) continue;
-            each.joint.numbers[n] = values.number(each.numbers[n]);
-            other_form = true;
-        }
+        bool other_form = each.joint.replace_numbers(values, each.numbers);
         if (each.geometry.size() > 0 && values.changed(each.geometry)) {
             const Vec3 now = values.vector(each.geometry);
             (each.act == Act::ball_servo ? each.target_rotation

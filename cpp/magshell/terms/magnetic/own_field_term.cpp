@@ -3,7 +3,7 @@
 #include <mutex>
 #include <string>
 
-#include "magshell/assembly/rough_hessian_operator.h"
+#include "magshell/assembly/hessian_operator.h"
 #include "magshell/core/errors.h"
 
 namespace magshell {

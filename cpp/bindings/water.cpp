@@ -115,7 +115,7 @@ py::dict drag_gradients(const Water& water, const Array& positions, const Array&
 
 }  // namespace
 
-void register_force(py::module_& module) {
+void register_water(py::module_& module) {
     py::class_<AttackCurve>(module, "AttackCurve")
         .def(py::init<>(), "2 sin^2 phi")
         .def(py::init(&make_curve), py::arg("knots"), py::arg("cubics"),

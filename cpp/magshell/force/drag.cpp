@@ -1,4 +1,4 @@
-#include "magshell/force/attack_curve.h"
+#include "magshell/force/drag.h"
 
 #include <algorithm>
 #include <cmath>
