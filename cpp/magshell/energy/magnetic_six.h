@@ -19,27 +19,37 @@ class MagneticSix {
     static constexpr int points = 6;
     using Element = typename Law::Element;
 
-    MagneticSix(const SimdVec3 x[6], int point, const Element& e) : point_(point), frame_(of(x, point, e)) {}
-
-    static SimdVec3 position(const SimdVec3 x[6], int point) {
-        SimdVec3 at = SimdDouble(shapes_[point][0]) * x[0];
-        for (int k = 1; k < 6; ++k) at += SimdDouble(shapes_[point][k]) * x[k];
-        return at;
-    }
-
-    /// Returns the vectors a_1 and a_2 of nodes at x, or their rates for nodal velocities.
-    static std::array<SimdVec3, 2> edges(const SimdVec3 x[6], int point) {
-        return {combination(firsts_[point], x), combination(seconds_[point], x)};
-    }
+    MagneticSix(const SimdVec3 x[6], int point, const Element& e)
+        : point_(point), x_(x), frame_(of(x, point, e)) {}
 
     const Law& frame() const { return frame_; }
+    SimdVec3 position() const { return combination(shapes_[point_], x_); }
+    /// Returns the vectors a_1 and a_2 of nodes at x, or their rates for nodal velocities.
+    std::array<SimdVec3, 2> edges(const SimdVec3 x[6]) const {
+        return {combination(first(), x), combination(second(), x)};
+    }
     /// Computes the rates of the law's frame for given nodal velocities.
     void rates(const SimdVec3 along[6], SimdVec3 rate[3]) const {
-        const std::array<SimdVec3, 2> by = edges(along, point_);
+        const std::array<SimdVec3, 2> by = edges(along);
         const SimdVec3 ends[3] = {{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)}, by[0], by[1]};
         frame_.frame_rate(ends, rate);
     }
+    /// Returns the velocity of the point for given nodal velocities.
+    SimdVec3 velocity(const SimdVec3 along[6], const SimdVec3*) const {
+        return combination(shapes_[point_], along);
+    }
 
+    void add_gradient(const Element& e, const FieldAtPoint& field, bool varies, SimdVec3 g[6]) const {
+        add_gradient(e, field.flux, g);
+        if (varies) add_gradient_by_position(e, field, g);
+    }
+    /// Adds lower blocks at lower_index(k, l).
+    void add_hessian(const Element& e, const FieldAtPoint& field, bool varies, SimdMat3 h[21]) const {
+        add_hessian(e, field.flux, h);
+        if (varies) add_hessian_by_position(e, field, h);
+    }
+
+  private:
     void add_gradient(const Element& e, const SimdVec3& flux, SimdVec3 g[6]) const {
         SimdVec3 d1, d2;
         frame_.by_edges(e, flux, d1, d2);
@@ -90,7 +100,6 @@ class MagneticSix {
                                                        SimdDouble(shape[k] * shape[l]) * field.curvature);
     }
 
-  private:
     const std::array<double, 6>& first() const { return firsts_[point_]; }
     const std::array<double, 6>& second() const { return seconds_[point_]; }
 
@@ -100,9 +109,9 @@ class MagneticSix {
         return sum;
     }
     static Law of(const SimdVec3 x[6], int point, const Element& e) {
-        const std::array<SimdVec3, 2> from_first = edges(x, point);
-        const SimdVec3 corners[3] = {
-            {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)}, from_first[0], from_first[1]};
+        const SimdVec3 corners[3] = {{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)},
+                                     combination(firsts_[point], x),
+                                     combination(seconds_[point], x)};
         return Law(corners, e);
     }
     static void set_column(SimdMat3& matrix, int j, const SimdVec3& column) {
@@ -120,6 +129,7 @@ class MagneticSix {
     }();
 
     const int point_;
+    const SimdVec3* x_;
     const Law frame_;
 };
 

@@ -50,25 +50,25 @@ struct MagneticSolid : PushForward<N> {  // alpha_k [A/m2]
         }
 
         /// Adds the part of the gradient that is due to the gradient of the field.
-        void add_gradient_by_position(const std::array<double, N>& shapes, const FieldAtPoint& field,
+        void add_gradient_by_position(const std::array<SimdDouble, N>& shapes, const FieldAtPoint& field,
                                       SimdVec3 g[N]) const {
             const SimdVec3 pull = -point_.volume * multiply(transpose(field.gradient), magnetization());
-            for (int k = 0; k < N; ++k) g[k] += SimdDouble(shapes[k]) * pull;
+            for (int k = 0; k < N; ++k) g[k] += shapes[k] * pull;
         }
 
         /// Does nothing: in a field taken as uniform the Hessian is zero.
         void add_hessian(const SimdVec3&, SimdMat3*) const {}
 
         /// Adds lower blocks at lower_index(k, l).
-        void add_hessian_by_position(const std::array<double, N>& shapes, const FieldAtPoint& field,
+        void add_hessian_by_position(const std::array<SimdDouble, N>& shapes, const FieldAtPoint& field,
                                      SimdMat3 h[]) const {
             const SimdMat3 along = -point_.volume * field.gradient, across = transpose(along),
                            twice = -point_.volume * field.curvature;
             for (int k = 0; k < N; ++k)
                 for (int l = 0; l <= k; ++l)
-                    h[lower_index(k, l)] += (SimdDouble(shapes[l]) * point_.alpha[k]) * along +
-                                            (SimdDouble(shapes[k]) * point_.alpha[l]) * across +
-                                            SimdDouble(shapes[k] * shapes[l]) * twice;
+                    h[lower_index(k, l)] += (shapes[l] * point_.alpha[k]) * along +
+                                            (shapes[k] * point_.alpha[l]) * across +
+                                            (shapes[k] * shapes[l]) * twice;
         }
 
       private:
@@ -81,9 +81,9 @@ struct MagneticSolid : PushForward<N> {  // alpha_k [A/m2]
 
 /// Returns the position of a point with given values of the shape functions.
 template <int N>
-SimdVec3 position_of(const std::array<double, N>& shapes, const SimdVec3 x[N]) {
-    SimdVec3 at = SimdDouble(shapes[0]) * x[0];
-    for (int k = 1; k < N; ++k) at += SimdDouble(shapes[k]) * x[k];
+SimdVec3 position_of(const std::array<SimdDouble, N>& shapes, const SimdVec3 x[N]) {
+    SimdVec3 at = shapes[0] * x[0];
+    for (int k = 1; k < N; ++k) at += shapes[k] * x[k];
     return at;
 }
 

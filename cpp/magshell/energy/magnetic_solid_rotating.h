@@ -72,10 +72,10 @@ struct RotatingMagneticSolid {
         }
 
         /// Adds the part of the gradient that is due to the gradient of the field.
-        void add_gradient_by_position(const std::array<double, N>& shapes, const FieldAtPoint& field,
+        void add_gradient_by_position(const std::array<SimdDouble, N>& shapes, const FieldAtPoint& field,
                                       SimdVec3 g[N]) const {
             const SimdVec3 pull = -point_.volume * multiply(transpose(field.gradient), magnetization_);
-            for (int k = 0; k < N; ++k) g[k] += SimdDouble(shapes[k]) * pull;
+            for (int k = 0; k < N; ++k) g[k] += shapes[k] * pull;
         }
 
         /// Adds lower blocks at lower_index(k, l) in a field taken as uniform.
@@ -98,7 +98,7 @@ struct RotatingMagneticSolid {
         }
 
         /// Adds the part due to the variation of the field in space.
-        void add_hessian_by_position(const std::array<double, N>& shapes, const FieldAtPoint& field,
+        void add_hessian_by_position(const std::array<SimdDouble, N>& shapes, const FieldAtPoint& field,
                                      SimdMat3 h[]) const {
             SimdVec3 columns[3];  // Y^-1 (m x dB/dx_j)
             for (int j = 0; j < 3; ++j)
@@ -116,9 +116,8 @@ struct RotatingMagneticSolid {
             const SimdMat3 twice = scale * field.curvature;
             for (int k = 0; k < N; ++k)
                 for (int l = 0; l <= k; ++l)
-                    h[lower_index(k, l)] += SimdDouble(shapes[l]) * by_node[k] +
-                                            SimdDouble(shapes[k]) * transpose(by_node[l]) +
-                                            SimdDouble(shapes[k] * shapes[l]) * twice;
+                    h[lower_index(k, l)] += shapes[l] * by_node[k] + shapes[k] * transpose(by_node[l]) +
+                                            (shapes[k] * shapes[l]) * twice;
         }
 
       private:

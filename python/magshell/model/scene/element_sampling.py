@@ -1,15 +1,16 @@
-"""Estimates the error of magnetic forces on six-node shells and solids, whose elements sample the field at few points.
+"""Computes magnetic forces on six-node shells and solids at the points where their elements sample the field, and at more.
 
 A four-node tetrahedron takes the force at its center, a ten-node one at four points, a six-node face at six points of its
-middle surface. Near a source the mean force over an element differs from that. It is computed here at many points of the
-elements that are near; a six-node face has them at three levels through its thickness.
+middle surface. Near a source the mean force over an element differs from that. Elements that sample finely (fine_faces.py
+says which do) take it at 64 points, of a face at 32 points on two levels through its thickness. The mean force is that at
+these points, of elements that sample finely that at 216 points, or 72 on three levels.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from ..solids.solid import Solid
 from .element_rules import FacePoints, ten_node_shapes, tetrahedron_rule
 
 if TYPE_CHECKING:
+    from .scene import Scene
     from .values import Values
 
 # Distance d of an element from sources, over its longest edge a, beyond which the points that a solve samples are enough:
@@ -28,7 +30,12 @@ if TYPE_CHECKING:
 # test_no_face_beyond_eight_edges_from_a_dipole_samples_finely
 FAR_EDGES = 8.0
 _TOGETHER = 512  # elements whose samples are in memory at the same time
-_PER_EDGE = 4  # points of the fine rule of a tetrahedron along an edge
+# Points of the rules of a tetrahedron along an edge: of elements that sample finely, and of those that show their error
+_PER_EDGE = {"fine": 4, "finer": 6}
+# The name in the core of the value of a face or an element that is 1 where it samples finely.
+KEY = "field_sampling"
+
+Rule = Literal["own", "fine", "finer"]
 
 
 class Sources(NamedTuple):
@@ -61,9 +68,14 @@ class Sources(NamedTuple):
 
 
 class ElementForces(NamedTuple):
-    """The forces on the elements of a body (n, 3) N as a solve takes them and as they are, and the couples (n, 3) N m."""
+    """The forces on the elements of a body (n, 3) N as a solve takes them and as they are, and the couples (n, 3) N m.
+
+    label: of the body's values in the core. fine: (n,), which elements sample finely.
+    """
 
     body: Any
+    label: str
+    fine: np.ndarray
     taken: np.ndarray
     mean: np.ndarray
     couples: np.ndarray
@@ -80,17 +92,30 @@ def element_forces(values: Values, positions: np.ndarray, sources: Sources) -> I
             continue
         count = len(elements.magnetization)
         taken, couples = np.empty((count, 3)), np.empty((count, 3))
-        for chunk in _chunks(np.arange(count)):
-            taken[chunk], couples[chunk] = sources.forces(*elements.moments(chunk, fine=False))
+        is_near = np.isin(np.arange(count), near)
+        parts: list[tuple[np.ndarray, Rule, Rule]] = [
+            (~elements.fine, "own", "fine"),
+            (elements.fine, "fine", "finer"),
+        ]
+        for part, taking, _ in parts:
+            for chunk in _chunks(np.flatnonzero(part)):
+                taken[chunk], couples[chunk] = sources.forces(*elements.moments(chunk, taking))
         mean = taken.copy()
-        for chunk in _chunks(near):
-            mean[chunk], _ = sources.forces(*elements.moments(chunk, fine=True))
-        yield ElementForces(elements.body, taken, mean, couples)
+        for part, _, reference in parts:
+            for chunk in _chunks(np.flatnonzero(part & is_near)):
+                mean[chunk], _ = sources.forces(*elements.moments(chunk, reference))
+        yield ElementForces(elements.body, elements.label, elements.fine, taken, mean, couples)
 
 
 def has_elements(values: Values) -> bool:
     """Return whether a scene has magnetized elements that sample the field at points of their own."""
     return any(_samples_by_elements(body) for body in values.scene.bodies)
+
+
+def labels_of_elements(scene: Scene) -> list[str]:
+    """Return the labels in the core of the bodies whose elements sample the field at points of their own."""
+    labels = {id(each): label for each, label in scene._labels}
+    return [labels[id(body)] for body in scene.bodies if _samples_by_elements(body)]
 
 
 def _samples_by_elements(body: Any) -> bool:
@@ -106,11 +131,22 @@ def _chunks(numbers: np.ndarray) -> list[np.ndarray]:
 class _Elements(ABC):
     """The magnetized elements of a body.
 
-    rest, now: (n, k, 3) m, the nodes of each. magnetization: (n, 3) A/m, the remanent one.
+    label: of the body's values in the core. rest, now: (n, k, 3) m, the nodes of each. magnetization: (n, 3) A/m, the
+    remanent one. fine: (n,), which of them sample finely.
     """
 
-    def __init__(self, body: Any, rest: np.ndarray, now: np.ndarray, magnetization: np.ndarray):
+    def __init__(
+        self,
+        body: Any,
+        label: str,
+        rest: np.ndarray,
+        now: np.ndarray,
+        magnetization: np.ndarray,
+        fine: np.ndarray,
+    ):
         self.body: Any = body
+        self.label: str = label
+        self.fine: np.ndarray = np.broadcast_to(fine, len(now))
         self.rest: np.ndarray = rest
         self.now: np.ndarray = now
         self.magnetization: np.ndarray = np.broadcast_to(magnetization, (len(now), 3))
@@ -118,15 +154,15 @@ class _Elements(ABC):
         self.sizes: np.ndarray = 2.0 * np.linalg.norm(now - self.centers[:, None], axis=2).max(axis=1)
 
     @abstractmethod
-    def moments(self, which: np.ndarray, fine: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (n, p, 3) m of some elements, and the magnetic moments there, A m2."""
+    def moments(self, which: np.ndarray, rule: Rule) -> tuple[np.ndarray, np.ndarray]:
+        """Return the points (n, p, 3) m of a rule in some elements, and the magnetic moments there, A m2."""
 
 
 class _Tetrahedra(_Elements):
-    def moments(self, which: np.ndarray, fine: bool) -> tuple[np.ndarray, np.ndarray]:
+    def moments(self, which: np.ndarray, rule: Rule) -> tuple[np.ndarray, np.ndarray]:
         rest, now, m = self.rest[which], self.now[which], self.magnetization[which]
         order = 1 if rest.shape[1] == 4 else 2
-        at, weights = tetrahedron_rule(_PER_EDGE if fine else None, order)
+        at, weights = tetrahedron_rule(_PER_EDGE.get(rule), order)
         values, slopes = (at, _LINEAR[None].repeat(len(at), 0)) if order == 1 else ten_node_shapes(at)
         at_rest = np.einsum("pka,nki->npia", slopes, rest)
         deformation = np.einsum("pka,nki->npia", slopes, now) @ np.linalg.inv(at_rest)
@@ -139,12 +175,12 @@ class _Tetrahedra(_Elements):
 
 
 class _SixNodeFaces(_Elements):
-    def moments(self, which: np.ndarray, fine: bool) -> tuple[np.ndarray, np.ndarray]:
+    def moments(self, which: np.ndarray, rule: Rule) -> tuple[np.ndarray, np.ndarray]:
         rest, now, m = self.rest[which], self.now[which], self.magnetization[which]
         thickness = np.broadcast_to(self.body.thickness, (len(self.now),))[which]
-        rule = FacePoints.finer() if fine else FacePoints.degree_4()
-        values, slopes = six_node_shapes(rule.at[:, 1:])
-        n, p = len(now), len(rule.at)
+        points = {"own": FacePoints.degree_4, "fine": FacePoints.fine, "finer": FacePoints.finer}[rule]()
+        values, slopes = six_node_shapes(points.at[:, 1:])
+        n, p = len(now), len(points.at)
         frames = [
             np.concatenate([np.zeros((n * p, 1, 3)), along.reshape(n * p, 2, 3)], axis=1)
             for along in (np.einsum("pak,nki->npai", slopes, each) for each in (rest, now))
@@ -152,10 +188,10 @@ class _SixNodeFaces(_Elements):
         rotates = self.body.magnetization_law == "rotates"
         turned = deformed_magnetization(*frames, np.repeat(m, p, axis=0), rotates).reshape(n, p, 3)
         across_rest, across = (np.cross(each[:, 1], each[:, 2]).reshape(n, p, 3) for each in frames)
-        volumes = 0.5 * rule.weights * np.linalg.norm(across_rest, axis=2) * thickness[:, None]
+        volumes = 0.5 * points.weights * np.linalg.norm(across_rest, axis=2) * thickness[:, None]
         normals = across / np.linalg.norm(across, axis=2, keepdims=True)
         at = np.einsum("pk,nki->npi", values, now)
-        at += (rule.heights * thickness[:, None])[..., None] * normals
+        at += (points.heights * thickness[:, None])[..., None] * normals
         return at, volumes[..., None] * turned
 
 
@@ -173,14 +209,19 @@ def _rotations(deformation: np.ndarray) -> np.ndarray:
 def _magnetized_elements(values: Values, positions: np.ndarray) -> Iterator[_Elements]:
     scene = values.scene
     labels = {id(each): label for each, label in scene._labels}
+    layout = scene._value_layout
     for body, span in zip(scene.bodies, scene._bodies.spans, strict=True):
         if not _samples_by_elements(body):
             continue
         now = values.current(body)
-        magnetization = scene._value_layout.of(values.numbers, labels[id(body)], "remanent_magnetization")
+        label = labels[id(body)]
+        magnetization = layout.of(values.numbers, label, "remanent_magnetization")
+        fine = layout.of(values.numbers, label, KEY) != 0.0
         nodes, kind = (
             (span.mesh.elements, _SixNodeFaces)
             if isinstance(body, Shell)
             else (span.mesh.tetrahedra, _Tetrahedra)
         )
-        yield kind(now, span.mesh.rest_positions[nodes], positions[span.vertices][nodes], magnetization)
+        yield kind(
+            now, label, span.mesh.rest_positions[nodes], positions[span.vertices][nodes], magnetization, fine
+        )

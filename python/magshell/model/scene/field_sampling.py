@@ -27,7 +27,7 @@ from ...errors import FieldSamplingWarning
 from ..shells.deformed_magnetization import deformed_magnetization, frames_of
 from ..solids.solid import Solid
 from .element_rules import FacePoints
-from .element_sampling import Sources, element_forces, has_elements
+from .element_sampling import KEY, Sources, element_forces, has_elements
 from .magnetization import magnetized_bodies
 
 if TYPE_CHECKING:
@@ -44,8 +44,6 @@ _CANCELLING = 0.1
 _SUSPECT = 0.35 * TRUSTED
 _MOST_NAMED = 4  # faces in a warning
 _TOGETHER = 2048  # faces whose samples are in memory at the same time
-# The name in the core of the value of a face that is 1 where it samples finely.
-KEY = "field_sampling"
 
 
 class _Faces(NamedTuple):
@@ -83,8 +81,8 @@ class _Faces(NamedTuple):
 class SamplingError(NamedTuple):
     """The relative error of the magnetic force on one body.
 
-    label: of the body's values in the core. off: (n_f,), the error of each face by the reference of `error`; NaN where the
-    field has no value at some point of the face. fine: (n_f,), which faces sample finely.
+    label: of the body's values in the core. off: (n,), the error of each face or element by the reference of `error`; NaN
+    where the field has no value at some point of it. fine: (n,), which sample finely.
     """
 
     body: Any
@@ -128,6 +126,35 @@ def warn_of_elements(
 
     Arguments as for sampling_errors().
     """
+    for each in element_errors(values, positions, field_factor, flux_density):
+        if each.error > TRUSTED:
+            order = np.argsort(-np.nan_to_num(each.off), kind="stable")
+            why, what_to_do = (
+                "as its elements sample the field at few points",
+                "start nearer to the source, or take",
+            )
+            if each.fine[order[0]]:
+                why, what_to_do = "although elements near the sources sample the field at many points", "take"
+            _warn(
+                f"{where}: the magnetic force on {each.body!r} is off by about {each.error:.2%}, {why}, and it changes "
+                f"over them; most of that is of {_named(order, 'elements')}. To mend it, {what_to_do} smaller elements "
+                "there, or keep the body farther away"
+            )
+        if len(unknown := np.flatnonzero(np.isnan(each.off))):
+            _warn(
+                f"{where}: {_named(unknown, 'elements')} of {each.body!r} reach to where a field has no value, into a "
+                "magnet or out of a grid, so that the error of the magnetic force on them cannot be told. Keep the body "
+                "farther away, or take a larger grid"
+            )
+
+
+def element_errors(
+    values: Values, positions: np.ndarray, field_factor: float, flux_density: Any
+) -> Iterator[SamplingError]:
+    """Yield the error of each magnetized six-node shell and solid that has elements near a source.
+
+    Arguments as for sampling_errors().
+    """
     if not has_elements(values):
         return
     sources = _sources(values, positions, field_factor, flux_density)
@@ -137,20 +164,11 @@ def warn_of_elements(
         off = each.taken - each.mean
         known = np.isfinite(off).all(axis=1)
         total = _size_of_forces(each.mean[known], each.couples[known], values.scene._bodies.extent)
-        error = float(np.linalg.norm(off[known].sum(axis=0))) / total if total > 0.0 else 0.0
-        if error > TRUSTED:
-            order = np.argsort(-np.linalg.norm(np.where(known[:, None], off, 0.0), axis=1), kind="stable")
-            _warn(
-                f"{where}: the magnetic force on {each.body!r} is off by about {error:.2%}, as its elements sample the "
-                f"field at few points, and it changes over them; most of that is of {_named(order, 'elements')}. "
-                "Take smaller elements there, or keep the body farther away"
-            )
-        if not known.all():
-            _warn(
-                f"{where}: {_named(np.flatnonzero(~known), 'elements')} of {each.body!r} reach to where a field has no "
-                "value, into a magnet or out of a grid, so that the error of the magnetic force on them cannot be "
-                "told. Keep the body farther away, or take a larger grid"
-            )
+        if (total > 0.0 and np.isfinite(total)) or not known.all():
+            total = total or 1.0  # without a force or a couple to compare with, no error is known
+            error = float(np.linalg.norm(off[known].sum(axis=0))) / total
+            off_by = np.where(known, np.linalg.norm(off, axis=1) / total, np.nan)
+            yield SamplingError(each.body, each.label, error, off_by, each.fine)
 
 
 def _advice(worst: SamplingError) -> str:

@@ -1,11 +1,11 @@
-"""Decides which three-node faces sample the applied field finely, in their plane and through their thickness.
+"""Decides which faces, and which tetrahedra, sample the applied field finely, inside and through their thickness.
 
-At the state in which a solve begins, with the fields as they will be at its end, the error of the magnetic force on each
-body is computed (field_sampling.py). Where it is more than 1 %, faces sample finely from then on, those with the largest
-errors first, until the others together are off by at most 0.02 %. They stay the same during the solve, its linear algebra
-and its gradients: the energy would jump where they changed. A search for one equilibrium looks again at its end, and goes on
-from there with more fine faces if they are needed; paths and motions warn. A solve that starts from an earlier result keeps
-its fine faces.
+A "face" is a three-node face here, a six-node face or a tetrahedron. At the state in which a solve begins, with the fields
+as they will be at its end, the error of the magnetic force on each body is computed (field_sampling.py,
+element_sampling.py). Where it is more than 1 %, faces sample finely from then on, those with the largest errors first, until the others together
+are off by at most 0.02 %. They stay the same during the solve, its linear algebra and its gradients: the energy would jump
+where they changed. A search for one equilibrium looks again at its end, and goes on from there with more fine faces if they
+are needed; paths and motions warn. A solve that starts from an earlier result keeps its fine faces.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 
 from ..._input.quantity import quantity
 from ..fields.field import UniformField
-from .element_sampling import FAR_EDGES
-from .field_sampling import KEY, TRUSTED, SamplingError, is_suspect, sampling_errors
+from .element_sampling import FAR_EDGES, KEY, labels_of_elements
+from .field_sampling import TRUSTED, SamplingError, element_errors, is_suspect, sampling_errors
 
 if TYPE_CHECKING:
     from .parameter_layout import Layout
@@ -83,43 +83,54 @@ def with_fine_faces_and_errors(
     inputs: Inputs, state: np.ndarray, load_parameters: np.ndarray, estimate: float | None = None
 ) -> tuple[Inputs, list[SamplingError] | None]:
     """Return what with_fine_faces() returns, and the errors of sampling in this state before; None if not computed."""
-    scene = inputs.scene
-    if not _keys(scene._value_layout):
+    layout = inputs.scene._load_parameter_layout
+    if not _keys(inputs.scene._value_layout):
         return inputs, None
-    if estimate is None:
-        if _is_far(inputs.values, state):
-            return inputs, None
-        with inputs.in_core():
-            estimate = scene._model.field_sampling_error(state, load_parameters)
-    if not is_suspect(estimate):
-        return inputs, None
-    positions = scene._model.positions(state)
-    if any(field._in_magnets(positions).any() for field in map(inputs.values.current, scene.fields)):
-        # the field has another formula inside of a magnet, and fine faces would not mend that
-        return inputs, None
-    layout = scene._load_parameter_layout
-    errors = list(
-        sampling_errors(
-            inputs.values,
-            positions,
-            float(layout.of(load_parameters, "scene", "field_factor")[0]),
-            layout.of(load_parameters, "scene", "applied_flux_density")[0],
-        )
+    positions = inputs.scene._model.positions(state)
+    at = (
+        positions,
+        float(layout.of(load_parameters, "scene", "field_factor")[0]),
+        layout.of(load_parameters, "scene", "applied_flux_density")[0],
     )
+    errors = None
+    if _are_faces_suspect(inputs, state, load_parameters, estimate):
+        errors = list(sampling_errors(inputs.values, *at))
+    found = [*(errors or ()), *element_errors(inputs.values, *at)]
     numbers = {}
-    for each in errors:
+    for each in found:
         more = _faces_to_refine(each)
         if len(more):
             numbers[each.label, KEY] = each.fine.astype(np.float64)
             numbers[each.label, KEY][more] = 1.0
+    if numbers and any(
+        field._in_magnets(positions).any() for field in map(inputs.values.current, inputs.scene.fields)
+    ):
+        # the field has another formula inside of a magnet, and fine faces would not mend that
+        return inputs, errors
     return _with(inputs, numbers), errors
+
+
+def _are_faces_suspect(
+    inputs: Inputs, state: np.ndarray, load_parameters: np.ndarray, estimate: float | None
+) -> bool:
+    """Return whether the error of three-node faces has to be computed."""
+    if not _keys_of_faces(inputs.values):
+        return False
+    if estimate is None:
+        if _is_far(inputs.values, state):
+            return False
+        with inputs.in_core():
+            estimate = inputs.scene._model.field_sampling_error(state, load_parameters)
+    return is_suspect(estimate)
 
 
 def _is_far(values: Values, state: np.ndarray) -> bool:
     """Return whether all sources are known to be so far that one sample a face is enough."""
     scene = values.scene
     layout = scene._value_layout
-    thickness = max(float(layout.of(values.numbers, label, "thickness").max()) for label, _ in _keys(layout))
+    thickness = max(
+        float(layout.of(values.numbers, label, "thickness").max()) for label, _ in _keys_of_faces(values)
+    )
     size = max(float(scene.mesh.edge_lengths.max()), thickness)
     positions = scene._model.positions(state)
     for field in map(values.current, scene.fields):
@@ -142,6 +153,12 @@ def _faces_to_refine(found: SamplingError) -> np.ndarray:
     errors = np.sort(found.off[once])
     least = errors[np.cumsum(errors) > _LEFT].min(initial=np.inf)
     return once[found.off[once] >= _EQUAL * least]
+
+
+def _keys_of_faces(values: Values) -> list[tuple[str, str]]:
+    """Return the keys of three-node faces."""
+    others = labels_of_elements(values.scene)
+    return [key for key in _keys(values.scene._value_layout) if key[0] not in others]
 
 
 def _keys(layout: Layout) -> list[tuple[str, str]]:

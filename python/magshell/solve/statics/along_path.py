@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model.contact.obstacles import Obstacle
-from ...model.scene.field_sampling import KEY
+from ...model.scene.element_sampling import KEY
 from ...model.scene.solve_inputs import Inputs
 from ...model.scene.time_varying import names_in_time, values_between
 from ...model.scene.values import Values
