@@ -2,10 +2,11 @@
 
 A "face" is a three-node face here, a six-node face or a tetrahedron. At the state in which a solve begins, with the fields
 as they will be at its end, the error of the magnetic force on each body is computed (field_sampling.py,
-element_sampling.py). Where it is more than 1 %, faces sample finely from then on, those with the largest errors first, until the others together
-are off by at most 0.02 %. They stay the same during the solve, its linear algebra and its gradients: the energy would jump
-where they changed. A search for one equilibrium looks again at its end, and goes on from there with more fine faces if they
-are needed; paths and motions warn. A solve that starts from an earlier result keeps its fine faces.
+element_sampling.py). Where it is more than 1 %, faces sample finely from then on, those with the largest errors first,
+until the others together are off by at most 0.02 %. They stay the same during the solve, its linear algebra and its
+gradients: the energy would jump where they changed. A search for one equilibrium looks again at its end, and goes on from
+there with more fine faces if they are needed; paths and motions warn. A solve that starts from an earlier result keeps its
+fine faces.
 """
 
 from __future__ import annotations
