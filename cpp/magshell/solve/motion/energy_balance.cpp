@@ -66,8 +66,11 @@ bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& r
 
 double EnergyBalance::gain_by_contact(const StateEnergy& begin, const MotionState& end,
                                       const LoadParameters& load_parameters) const {
-    return end_.of_contact - begin.of_contact +
-           model_.contact_forces(end.q, load_parameters).dot(end.q - begin.q);
+    // With the obstacles as they are at the end: what they do as they move is work put in.
+    const double before = begin.load_parameters == load_parameters
+                              ? begin.of_contact
+                              : model_.contacts().energy(begin.q, load_parameters);
+    return end_.of_contact - before + model_.contact_forces(end.q, load_parameters).dot(end.q - begin.q);
 }
 
 double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,

@@ -16,6 +16,8 @@
 // meet obliquely. With the contact forces f at the end of the step, contact itself then does more work than it stores less:
 //
 //   G = E_C(x_end) - E_C(x_begin) + f . (x_end - x_begin) > 0
+//
+// with both energies for the obstacles at the end of the step, since obstacles that move do work.
 #pragma once
 
 #include <span>
