@@ -32,7 +32,7 @@ demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pict
 test: $(VENV)/.with-test  ## every test, the notebooks and examples included
 	$(PYTEST)
 
-quick: $(VENV)/.with-test  ## the tests that take little time: two minutes on two processors
+quick: $(VENV)/.with-test  ## the tests that take little time: some five minutes on two processors
 	$(PYTEST) -m "not slow"
 
 seconds: $(VENV)/.with-test  ## measure again which tests take long, for `make quick`: every test
