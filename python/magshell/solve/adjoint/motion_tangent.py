@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 _STEP = 1 / 64
 # Round-off (1) of a value that is linear along the direction. Tested by the same.
 _LINEAR = 1e-13
+_FORCES = ("loads", "forces")  # the owner and name of forces on vertices among the core's values
 _ADVICE = "take gradients with backward(), torch.func.vjp or jacrev"
 
 
@@ -160,7 +161,7 @@ class _Direction:
                 :, None
             ]
 
-        rates = directional_derivative(at, steps_along(inputs, leaf, change))
+        rates = directional_derivative(at, steps_along(inputs, leaf, change), sizes=self._sizes(len(at(0.0))))
         if rates is None:
             raise NoGradient(
                 f"no tangent by {leaf.name}: the scene is not smooth in it, or it is at the end of its range; {_ADVICE}"
@@ -171,6 +172,17 @@ class _Direction:
         own = rates[n_values + n_masses :].reshape(-1, 3)
         if asked._begins_anew and own.size:
             self._velocity += self._vector(np.zeros((inputs.scene.mesh.n_vertices, 3)), own)
+
+    def _sizes(self, count: int) -> np.ndarray:
+        """Return the sizes (count,) by which `directional_derivative` compares values with others: only forces on vertices.
+
+        They are sums over faces, which cancel at the corners of six-node elements, up to round-off of the largest.
+        """
+        sizes, layout = np.zeros(count), self._inputs.scene._value_layout
+        if _FORCES in layout:
+            rows = layout.of(np.arange(layout.size), *_FORCES)
+            sizes[rows[: self._inputs.scene.mesh.n_vertices]] = 1.0
+        return sizes
 
     def _add_rest(self, leaf: Leaf, change: np.ndarray) -> None:
         """Add a change of rest positions: of masses, and of the start where that is the rest shape."""
