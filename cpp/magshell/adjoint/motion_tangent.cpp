@@ -6,12 +6,9 @@
 #include <string>
 #include <utility>
 
-#include "magshell/adjoint/motion_derivatives.h"
-#include "magshell/adjoint/viscous_tangent.h"
+#include "magshell/adjoint/motor_force_tangent.h"
 #include "magshell/core/errors.h"
 #include "magshell/solve/motion/edge_rotations.h"
-#include "magshell/solve/motion/motor_reactions.h"
-#include "magshell/solve/newton/unsymmetric.h"
 
 namespace magshell {
 namespace {
@@ -40,7 +37,9 @@ class ForwardSweep {
           input_(input),
           along_(along),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
-          derivatives_(model_, values, input.varying, along) {}
+          derivatives_(model_, values, input.varying, along),
+          solver_(newton, input, along, derivatives_),
+          motors_(newton, input, along, derivatives_, solver_) {}
 
     // Computes the tangent of the start and records it.
     void begin(const MotionState& start) {
@@ -208,102 +207,6 @@ class ForwardSweep {
         tangent.acceleration = both.tail(size);
     }
 
-    // Returns (H + W) times a change of the state evaluated last.
-    VectorXd product(const VectorXd& change, const VectorXd& weights) const {
-        VectorXd forces(change.size());
-        model_.multiply(change, forces);
-        model_.nonsymmetric_tangent().add_product(change, false, forces);
-        return forces + weights.cwiseProduct(change);
-    }
-
-    // Returns the change of the state that cancels a change of the residual of a stage, given the change of the prescribed motion. The
-    // model must have been evaluated last at q. nearby: a factorization made near q, or nullptr.
-    VectorXd solve(const VectorXd& q, const LoadParameters& load_parameters, const ProximalTerm& proximal,
-                   const PrescribedTangent& change, VectorXd residual, const Factor* nearby) {
-        newton_.watch(0.0);
-        const DofMap& dof_map = model_.dof_map();
-        VectorXd moved = change.motion();
-        if (moved.size() == 0) moved = VectorXd::Zero(q.size());
-        if (!moved.isZero(0.0)) {
-            model_.assemble(q, load_parameters, false);
-            model_.assemble_forces(load_parameters);
-            VectorXd pull = product(moved, *proximal.weights);
-            if (change.by_motors.size() > 0)
-                dof_map.add_motor_increment_forces(newton_.gradient(q, proximal), change.by_motors, pull);
-            residual += pull;
-        }
-        VectorXd reduced = -dof_map.vector(residual);
-        if (change.reduced_residual.size() > 0) reduced -= change.reduced_residual;
-        if (reduced.isZero(0.0)) return moved;
-        const bool symmetric =
-            !model_.capabilities().has_unsymmetric_tangent && !model_.capabilities().has_velocity_forces;
-        if (nearby && symmetric && change.reduced_residual.size() == 0) {
-            VectorXd solution = -residual;
-            if (newton_.solve_gmres_adjoint(q, load_parameters, proximal, *nearby, solution).converged)
-                return moved + solution;
-        }
-        Eigen::MatrixXd no_moves(q.size(), 0);
-        const FactorReport factor = newton_.factorize(q, load_parameters, false, proximal, no_moves);
-        if (!factor.succeeded)
-            throw InvalidInput("the tangent of a time step cannot be computed: " + factor.reason);
-        factorized_here_ = true;
-        if (newton_.is_unsymmetric()) {
-            const GmresReport report =
-                solve_unsymmetric(model_, *newton_.factor(), false, to_round_off, reduced);
-            if (!report.converged)
-                throw InvalidInput(
-                    "a linear solve of the tangent of a time step did not converge: its relative residual "
-                    "is " +
-                    std::to_string(report.residual));
-        } else {
-            newton_.factor()->solve_approximately(reduced, to_round_off.tolerance);
-        }
-        return moved + dof_map.expand(reduced);
-    }
-
-    // Returns a factorization that was made near stage i: that of its last Newton iteration, or that of the stage before, whose inertia is
-    // the same and whose stiffness is nearly so without contact; nullptr if there is none.
-    const Factor* nearby_factor(const SubstepRecord& record, int i, const LoadParameters& load_parameters) {
-        const StageState& stage = record.stages[i];
-        if (stage.factor) return stage.factor.get();
-        const bool serves = i > 0 && factorized_here_ && !model_.contacts().acts(stage.q, load_parameters);
-        return serves ? newton_.factor().get() : nullptr;
-    }
-
-    // Returns the derivative of the inertial and damping forces M w + Gamma v at a fixed state q, with v = (q - x^)/T, w = (v - v^)/T and the
-    // time T = a dt of the stage.
-    VectorXd inertia_tangent(const StageTangent& stage, const VectorXd& v, const VectorXd& w) const {
-        const Inertia& inertia = input_.inertia;
-        const VectorXd v_tangent = -(stage.x_hat_tangent + stage.T_tangent * v) / stage.T;
-        const VectorXd w_tangent = (v_tangent - stage.v_hat_tangent - stage.T_tangent * w) / stage.T;
-        return along_.mass.cwiseProduct(w) + inertia.mass.cwiseProduct(w_tangent) +
-               along_.damping.cwiseProduct(v) + inertia.damping.cwiseProduct(v_tangent);
-    }
-
-    // Returns the derivative of the acceleration by contact, c = J (J^T M J)^-1 J^T f, of a stage that moves by q_tangent.
-    VectorXd contact_tangent(const StageTangent& stage, const VectorXd& q, const VectorXd& q_tangent,
-                             const VectorXd& by_inputs, const VectorXd& c) {
-        const DofMap& dof_map = model_.dof_map();
-        const VectorXd& mass = input_.inertia.mass;
-        const VectorXd force = model_.contact_forces(q, stage.load_parameters) / stage.contact_factor;
-        model_.multiply_contact_transposed(q, stage.load_parameters, q_tangent);  // assembles contact alone
-        const VectorXd pull = product(q_tangent, VectorXd::Zero(q.size()));
-        const VectorXd force_tangent = (by_inputs - pull) / stage.contact_factor;
-        VectorXd found = dof_map.acceleration(mass, force_tangent - along_.mass.cwiseProduct(c));
-        if (!dof_map.has_reduced_coordinates()) return found;
-        found += rotation_derivative_.of(
-            [&](double t) {
-                Model& there = derivatives_.set(t, stage.load_parameters + t * stage.tangent);
-                there.linearize(q + t * q_tangent);
-                return there.dof_map().acceleration(mass, force);
-            },
-            derivatives_.step_along({{along_.length, largest(q_tangent)}}), 0.0,
-            "the acceleration by contact");
-        derivatives_.set(0.0, stage.load_parameters);
-        model_.linearize(q);
-        return found;
-    }
-
     // Computes the tangent after a substep from that before it. Returns the tangent of the motor forces at its end if it is wanted.
     VectorXd take(Index step, const Substep& part, const SubstepRecord& record, bool wants_motor_forces) {
         const double fraction = part.fraction(), dt_tangent = fraction * along_.time_steps[step];
@@ -315,7 +218,7 @@ class ForwardSweep {
         const Index size = model_.size(), coordinates = model_.n_coordinates();
         const ScopedStrainHistory elastic_afterwards(model_);
         const ScopedContactFactor usual_contact_afterwards(model_);
-        factorized_here_ = false;
+        solver_.begin_substep();
         derivatives_.set_history(nullptr, nullptr);
         const LoadParameters begin = input_.load_parameters_at(step, part.begin),
                              begin_tangent = load_tangent(step, part.begin);
@@ -389,17 +292,18 @@ class ForwardSweep {
             derivatives_.set_history(strains.shift(), joints.shift());
             const ForceTangent forces = derivatives_.forces(stage, q, tableau.implicit_contact);
             newton_.evaluate(q, stage.load_parameters, proximal);
-            const VectorXd residual = forces.gradient + inertia_tangent(stage, v, w) +
+            const VectorXd residual = forces.gradient + solver_.inertia(stage, v, w) +
                                       strains.forces(q, size) + joints.forces(q, size);
             const PrescribedTangent change = derivatives_.prescribed(stage, q, newton_.gradient(q, proximal));
-            q_tangent = solve(q, stage.load_parameters, proximal, change, residual,
-                              nearby_factor(record, i, stage.load_parameters));
+            q_tangent = solver_.solve(q, stage.load_parameters, proximal, change, residual,
+                                      solver_.nearby_factor(record, i, stage.load_parameters));
             StageRates& now = tangents.emplace_back();
             now.v = VectorXd::Zero(size);
             now.v.head(coordinates) = (q_tangent - x_hat_tangent - T_tangent * v).head(coordinates) / T;
             now.acceleration = (now.v - v_hat_tangent - T_tangent * w) / T;
             if (tableau.implicit_contact) {
-                now.c = contact_tangent(stage, q, q_tangent, forces.contact, record.stages[i].contact);
+                now.c = solver_.contact_acceleration(stage, q, q_tangent, forces.contact,
+                                                     record.stages[i].contact);
                 now.acceleration -= stage.contact_factor * now.c;
             }
             if (!strains.idle())
@@ -411,17 +315,14 @@ class ForwardSweep {
                               derivatives_.strains(model_.dampers(), q, q_tangent, stage.load_parameters,
                                                    stage.tangent));
             if (i + 1 == n && wants_motor_forces && model_.dof_map().has_motors())
-                motor_forces = motor_tangent(algebra, at, stage, q, proximal, v_hat_tangent, now, dt_tangent,
-                                             strains, joints);
+                motor_forces = motors_.at_end(algebra, at, stage, q, proximal, tangent_.v, now, dt_tangent,
+                                              strains, joints);
         }
         StageRates last = std::move(tangents.back());
         if (at.flight.any())
             finish_flight(algebra, dt_tangent, record.begin, record.stages.back().q, at.all.back(), last,
                           q_tangent);
-        if (model_.dof_map().has_motors()) {
-            v_before_ = tangent_.v;
-            dt_before_tangent_ = dt_tangent;
-        }
+        if (model_.dof_map().has_motors()) motors_.end_substep(tangent_.v, dt_tangent);
         tangent_.q = std::move(q_tangent);
         tangent_.v = last.v;
         if (!strains.idle()) {
@@ -432,84 +333,19 @@ class ForwardSweep {
         return motor_forces;
     }
 
-    // Returns the tangent of the motor forces at the end of a substep (solve/motion/motor_reactions.h).
-    VectorXd motor_tangent(const StepAlgebra& algebra, const StepRates& at, const StageTangent& last,
-                           const VectorXd& q_last, const ProximalTerm& there, const VectorXd& v_hat_tangent,
-                           const StageRates& rates_tangent, double dt_tangent, const ViscousTangent& strains,
-                           const ViscousTangent& joints) {
-        const DofMap& dof_map = model_.dof_map();
-        const Index coordinates = model_.n_coordinates();
-        StageTangent stage = last;
-        stage.contact_factor = 1.0;
-        const MotionState& begin = stage.record.begin;
-        derivatives_.set_stage(stage);
-        const VectorXd& v_hat = stage.v_hat;
-        const MotorReactions end(newton_, input_.inertia, begin, algebra, q_last, stage.load_parameters,
-                                 there, v_hat, at.all.back());
-        if (!end.converged())
-            throw InvalidInput(
-                "the motor forces have no tangent in a step in which they could not be computed (NaN)");
-        const ProximalTerm proximal = end.proximal();
-        const VectorXd& q = end.q();
-        const ForceTangent forces = derivatives_.forces(stage, q, false);
-        newton_.evaluate(q, stage.load_parameters, proximal);
-        VectorXd v = VectorXd::Zero(q.size());
-        v.head(coordinates) = (q - stage.x_hat).head(coordinates) / stage.T;
-        VectorXd residual = forces.gradient + inertia_tangent(stage, v, (v - v_hat) / stage.T) +
-                            strains.forces(q, q.size()) + joints.forces(q, q.size());
-        if (end.acceleration_change().size() > 0) {
-            residual += along_.mass.cwiseProduct(end.acceleration_change());
-            VectorXd change = VectorXd::Zero(q.size());
-            if (end.is_first_step()) {
-                change = end.contact_weight() * rates_tangent.c;
-            } else {
-                // The acceleration is homogeneous of degree -1 in the lengths of this substep and the one before.
-                const VectorXd w = algebra.stage_acceleration(at.all.back(), v_hat);
-                const VectorXd by_dt =
-                    -(end.acceleration_change() + w + begin.dt_before * end.change_by_dt_before()) /
-                    algebra.dt();
-                change = end.weight_last() * rates_tangent.v + end.weight_begin() * tangent_.v +
-                         end.weight_before() * v_before_ + dt_tangent * by_dt +
-                         dt_before_tangent_ * end.change_by_dt_before() -
-                         (rates_tangent.v - v_hat_tangent - stage.T_tangent * w) / stage.T;
-            }
-            residual += input_.inertia.mass.cwiseProduct(change);
-        }
-        const VectorXd gradient = newton_.gradient(q, proximal);
-        const PrescribedTangent change = derivatives_.prescribed(stage, q, gradient);
-        const VectorXd q_tangent = solve(q, stage.load_parameters, proximal, change, residual, nullptr);
-        // Assembles again, because the factorization has rotated the blocks of rotated nodes.
-        newton_.evaluate(q, stage.load_parameters, proximal);
-        model_.assemble(q, stage.load_parameters, false);
-        model_.assemble_forces(stage.load_parameters);
-        VectorXd found = dof_map.motor_forces(residual + product(q_tangent, *proximal.weights));
-        found += motor_derivative_.of(
-            [&](double t) {
-                Model& there = derivatives_.set(t, stage.load_parameters + t * stage.tangent);
-                there.linearize(q + t * q_tangent);
-                return there.dof_map().motor_forces(gradient);
-            },
-            derivatives_.step_along({{along_.length, largest(q_tangent)}}), 0.0, "the force of a motor");
-        derivatives_.set(0.0, stage.load_parameters);
-        model_.linearize(q);
-        return found;
-    }
-
     Newton& newton_;
     Model& model_;
     const MotionInput& input_;
     const MotionInputTangent& along_;
     Stepper stepper_;
     MotionDerivatives derivatives_;
+    StageTangentSolver solver_;
+    MotorForceTangent motors_;
     const Viscosity no_change_{0.0, {}, 0.0};
     MotionState tangent_;  // of the current state
-    VectorXd v_before_;    // as MotionState::v_before
-    double dt_before_tangent_ = 0.0;
     std::vector<MotionTangent::State> states_;
-    DirectionalDerivative start_derivative_, flight_derivative_, flight_end_derivative_, rotation_derivative_,
-        motor_derivative_;
+    DirectionalDerivative start_derivative_, flight_derivative_, flight_end_derivative_;
     double progress_ = 0.0;
-    bool factorized_here_ = false;  // whether the factorization of newton_ is of this substep
 };
 
 // Computes the tangent beside a motion, until that is impossible; the motion itself continues.
