@@ -164,7 +164,7 @@ Array rotations_of(const Model& model, const MotionResult& motion) {
     return rows;
 }
 
-// Returns the fixed directors of the recorded states, (n, 3 n_d), as they are stored between positions and
+// Returns the given directions across edges of the recorded states, (n, 3 n_d), as they are stored between positions and
 // rotations.
 Array directions_of(const MotionResult& motion, const Model& model) {
     const py::ssize_t n = static_cast<py::ssize_t>(motion.recorded.size());

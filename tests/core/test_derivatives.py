@@ -294,7 +294,7 @@ HESSIAN_TOLERANCE = 1e-9
 
 
 def steps(problem):
-    """Return the unit of each unknown: a length of the mesh for positions, 1 for rotations and directors, (n,)."""
+    """Return the unit of each unknown: a length of the mesh for positions, 1 for rotations and directions, (n,)."""
     size = problem.scene.mesh.edge_lengths.min()
     units = np.ones(problem.model.size)
     units[: 3 * problem.scene.mesh.n_vertices] = size

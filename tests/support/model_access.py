@@ -41,7 +41,7 @@ class Problem:
 
     @property
     def n_nodes(self) -> int:
-        """The number of vertices and directors; the rotations come after their components."""
+        """The number of vertices and directions; the rotations come after their components."""
         return (self.model.size - self.n_rotations) // 3
 
     @property
@@ -51,7 +51,7 @@ class Problem:
 
     @property
     def order(self) -> np.ndarray:
-        """The position of each dof of the core in (positions, edge rotations), (n,); -1 for directors."""
+        """The position of each dof of the core in (positions, edge rotations), (n,); -1 for directions across edges."""
         mesh = self.scene.mesh
         numbers = np.arange(3.0 * mesh.n_vertices).reshape(-1, 3)
         order = self.model.state(numbers, 3.0 * mesh.n_vertices + np.arange(mesh.n_edges))

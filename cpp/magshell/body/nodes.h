@@ -1,9 +1,9 @@
-// The dofs of a scene, and the nodes of all its bodies: vertices first, then directors.
+// The dofs of a scene, and the nodes of all its bodies: vertices first, then given directions.
 //
 //   q = [ 3 per node | 1 per scalar ]        scalars: edge rotations
 //
-// A direction is a prescribed unit vector that clamped edges, symmetry planes and edge moments refer to. It is stored as a node, with three
-// components and derivatives like a vertex, and is always prescribed.
+// A direction is a given unit vector across an edge, to which clamped edges, symmetry planes and edge moments refer. It is stored as a node,
+// with three components and derivatives like a vertex, and is always prescribed.
 #pragma once
 
 #include <string>

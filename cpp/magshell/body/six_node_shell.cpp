@@ -57,7 +57,7 @@ void SixNodeShell::add_dihedrals(const SixNodeInput& input, const std::vector<Di
             const bool forward = mesh.edge_faces()(e, 0) == user;
             const std::array<Index, 6>& own = own_nodes[f];
             const int from = (i + 1) % 3, to = (i + 2) % 3;
-            // Nodes as in strain/dihedral_angle_six.h: the edge, the left face, then the director in place of the right face.
+            // Nodes as in strain/dihedral_angle_six.h: the edge, the left face, then the direction in place of the right face.
             if (direction_of[e] >= 0) {
                 side.dihedral = add({own[from], own[to], own[middle(i)], own[i], own[middle(from)],
                                      own[middle(to)], nodes.direction_node(direction_of[e]), -1, -1},

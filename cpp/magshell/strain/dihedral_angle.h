@@ -16,8 +16,8 @@
 //
 //   theta = α_left - α_right + π,   0 where the shell is flat, positive where the two normals lean towards each other.
 //
-// The right half-plane contains either a second face (r = x3 - x0) or a fixed director (r = x3). The latter
-// models a clamped edge, an edge on a symmetry plane and an edge under a couple.
+// The right half-plane contains either a second face (r = x3 - x0) or a direction across the edge (r = x3), which
+// is given: at a clamped edge, an edge on a symmetry plane and an edge under a couple.
 #pragma once
 
 #include "magshell/core/vector3.h"
@@ -69,7 +69,7 @@ inline void add_half_plane_hessian(const HalfPlane& w, const SimdDouble& factor,
 /// The dihedral angle at the edge x0-x1 between the half-planes of x2 (left) and x3 (right).
 struct DihedralAngle {
     HalfPlane left, right;
-    SimdDouble right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a director, r = x3
+    SimdDouble right_is_point;  // 1: x3 is a point, r = x3 - x0;  0: x3 is a direction, r = x3
 
     DihedralAngle(const SimdVec3& x0, const SimdVec3& x1, const SimdVec3& x2, const SimdVec3& x3,
                   const SimdDouble& right_is_point_)

@@ -8,7 +8,7 @@
 //   3, 4, 5; 6, 7, 8   left and right face: opposite corner, middle between `to` and it, middle between it and `from`
 //
 // so the angle is that of strain/dihedral_angle.h about the edge (0, t) with the half-planes of u_left and
-// u_right. A fixed director in place of the right face is node 6 alone.
+// u_right. A given direction across the edge, in place of the right face, is node 6 alone.
 #pragma once
 
 #include "magshell/energy/symmetric3.h"
@@ -93,7 +93,7 @@ class DihedralAngleSix {
         six_nodes::inward(six_nodes::gauss[0]), six_nodes::inward(six_nodes::gauss[1])};
     double tangent(int a) const { return tangents_[point_][a]; }
     double inward_weight(int a) const { return inward_weights_[point_][a]; }
-    /// Weight of node a + 3 in the right half-plane; a director is the half-plane's vector itself.
+    /// Weight of node a + 3 in the right half-plane; a direction is the half-plane's vector itself.
     SimdDouble right(int a) const {
         const double alone = a == 3 ? 1.0 : 0.0;
         return SimdDouble(alone) + right_is_face_ * SimdDouble(inward_weight(a) - alone);
@@ -103,7 +103,7 @@ class DihedralAngleSix {
         const std::array<double, 3>& t = tangents_[point];
         const std::array<double, 6>& u = inward_weights_[point];
         std::array<SimdVec3, 9> x = relative_to_first_node<9>(places);
-        x[6] = places[6] - right_is_face * places[0];  // a director does not depend on the origin
+        x[6] = places[6] - right_is_face * places[0];  // a direction does not depend on the origin
         SimdVec3 tangent = {SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)}, shared = tangent;
         for (int a = 1; a < 3; ++a) {
             tangent += SimdDouble(t[a]) * x[a];

@@ -169,7 +169,7 @@ def test_obstacles_are_asked_with_points_on_faces():
 def test_states_of_a_motion_are_those_that_it_had_where_bodies_are_tied():
     """Check the state of a motion with tied bodies and a clamp.
 
-    The directors of clamps are stored behind the vertices, of which welded ones count once.
+    The directions across clamped edges are stored behind the vertices, of which welded ones count once.
     """
     other = PLATE.transformed(translation=(0.02, 0, 0))
     sheets = [ms.Shell(PLATE, **SOFT), ms.Shell(other, **SOFT)]

@@ -103,7 +103,7 @@ def test_bad_input_is_refused():
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_rotating_clamp_has_its_director_in_energies(order):
+def test_rotating_clamp_has_its_direction_in_energies(order):
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2), order=order)
     sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
     turned = ms.Clamp(mesh.edges_at(x=0.0), rotation=(0.0, -0.5, 0.0))

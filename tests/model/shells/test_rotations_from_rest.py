@@ -41,7 +41,7 @@ def loaded_scene(map_positions) -> ms.Scene:
 
 
 def turned_at_its_end() -> ms.Scene:
-    """Return a scene whose clamp moves nodes and directors, which causes forces on rotations."""
+    """Return a scene whose clamp moves nodes and directions across edges, which causes forces on rotations."""
     mesh, shell = sheet(arched)
     turned = ms.Clamp(right_edges(mesh), rotation=(0.0, 0.1, 0.02), displacement=(0, 0, 0.1))
     return ms.Scene(shell, supports=[ms.Clamp(left_edges(mesh)), turned])

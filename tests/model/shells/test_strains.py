@@ -192,7 +192,7 @@ def test_path_has_strains_at_each_point():
 
 @pytest.mark.parametrize("dtype", [None, "float64", "float32"])
 def test_motion_has_strains_in_each_state(dtype):
-    """Check a clamp that rotates, whose director is in none of the returned arrays."""
+    """Check a clamp that rotates, whose direction across the edge is in none of the returned arrays."""
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
     shell = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     clamp = ms.Clamp(mesh.edges_at(x=0.0), rotation=(0.0, -0.5, 0.0))

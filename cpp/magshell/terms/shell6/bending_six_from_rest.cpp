@@ -70,17 +70,17 @@ void BendingSixTerm::assemble_from_rest(Index group, const double* q, SystemMatr
     SixNodeRows rows;
     loop_.gather(group, q, x);
     BendingSix(x).rows(elements_[group], rows);
-    // The only nodes outside a face are the directors of clamped edges.
-    SimdVec3 directors[3][2] = {};
+    // The only nodes outside a face are the directions across clamped edges.
+    SimdVec3 directions[3][2] = {};
     SimdDouble sign[3] = {};
-    std::array<bool, 3> any_directors{};
+    std::array<bool, 3> any_directions{};
     for (int lane = 0; lane < SimdDouble::width; ++lane)
         for (int i = 0; i < 3; ++i) {
             const FaceSideSix& side = shell_.sides[loop_.element(group, lane)][i];
             sign[i].set(lane, side.sign);
             if (side.dihedral < 0) continue;
             const bool is_held = !shell_.dihedrals[side.dihedral].right_is_face;
-            any_directors[i] |= is_held;
+            any_directions[i] |= is_held;
             const SideNodes& at = side.on_left ? left_side : right_side;
             const std::array<int, 6> own = face_order(i);
             for (int g = 0; g < 2; ++g) {
@@ -95,7 +95,7 @@ void BendingSixTerm::assemble_from_rest(Index group, const double* q, SystemMatr
                     SimdVec3& row = rows.at[3 * i + g][own[k]];
                     set_lane(row, lane, lane_of(row, lane) + part(at.own[k]));
                 }
-                if (is_held) set_lane(directors[i][g], lane, part(at.beyond));
+                if (is_held) set_lane(directions[i][g], lane, part(at.beyond));
             }
         }
     const Symmetric9 stiffness = history_.scaled(stiffness_[group]);
@@ -118,15 +118,15 @@ void BendingSixTerm::assemble_from_rest(Index group, const double* q, SystemMatr
                                          lane);
         add_rotations(group, lane, sign, stiffness, out);
     }
-    if (any_directors[0] || any_directors[1] || any_directors[2])
-        add_directors(group, directors, sign, stiffness, stiff, out);
+    if (any_directions[0] || any_directions[1] || any_directions[2])
+        add_directions(group, directions, sign, stiffness, stiff, out);
 }
 
-/// Adds the blocks between the fixed directors of clamped edges and the nodes and rotations of their faces, and
-/// among directors.
-void BendingSixTerm::add_directors(Index group, const SimdVec3 (&directors)[3][2], const SimdDouble sign[3],
-                                   const Symmetric9& stiffness, const SixNodeRows& stiff,
-                                   SystemMatrix& out) const {
+/// Adds the blocks between the directions across clamped edges and the nodes and rotations of their faces, and
+/// among directions.
+void BendingSixTerm::add_directions(Index group, const SimdVec3 (&directions)[3][2], const SimdDouble sign[3],
+                                    const Symmetric9& stiffness, const SixNodeRows& stiff,
+                                    SystemMatrix& out) const {
     for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
         const Index f = loop_.element(group, lane);
         const std::array<Index, 15>& nodes = shell_.stencils[f].nodes;
@@ -145,16 +145,16 @@ void BendingSixTerm::add_directors(Index group, const SimdVec3 (&directors)[3][2
             const int row = 6 + 3 * i;
             for (int k = 0; k < 6; ++k)
                 add(row, k,
-                    outer(directors[i][0], stiff.at[3 * i][k]) +
-                        outer(directors[i][1], stiff.at[3 * i + 1][k]));
+                    outer(directions[i][0], stiff.at[3 * i][k]) +
+                        outer(directions[i][1], stiff.at[3 * i + 1][k]));
             for (int j = 0; j < 3; ++j) {
                 SimdVec3 stressed[2];  // coupling with the strains of edge j
                 for (int g = 0; g < 2; ++g)
-                    stressed[g] = stiffness(3 * i, 3 * j + g) * directors[i][0] +
-                                  stiffness(3 * i + 1, 3 * j + g) * directors[i][1];
+                    stressed[g] = stiffness(3 * i, 3 * j + g) * directions[i][0] +
+                                  stiffness(3 * i + 1, 3 * j + g) * directions[i][1];
                 if (is_held(j) && j <= i) {
                     const SimdMat3 block =
-                        outer(stressed[0], directors[j][0]) + outer(stressed[1], directors[j][1]);
+                        outer(stressed[0], directions[j][0]) + outer(stressed[1], directions[j][1]);
                     if (j == i)
                         out.add_diagonal_block(nodes[row], block, lane);
                     else

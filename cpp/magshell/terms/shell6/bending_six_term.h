@@ -137,9 +137,9 @@ class BendingSixTerm final : public StrainScaffold<BendingSixTerm, 9>, public Re
     // those second derivatives; and of faces at rest, with rotations measured from the reference orientation.
     void assemble_faces(Index group, const double* q, const Strains& stress, SystemMatrix& out) const;
     void assemble_from_rest(Index group, const double* q, SystemMatrix& out) const;
-    // Adds the blocks with the directors of clamped edges, and those between the rotations of a face.
-    void add_directors(Index group, const SimdVec3 (&directors)[3][2], const SimdDouble sign[3],
-                       const Symmetric9& stiffness, const SixNodeRows& stiff, SystemMatrix& out) const;
+    // Adds the blocks with the directions across clamped edges, and those between the rotations of a face.
+    void add_directions(Index group, const SimdVec3 (&directions)[3][2], const SimdDouble sign[3],
+                        const Symmetric9& stiffness, const SixNodeRows& stiff, SystemMatrix& out) const;
     void add_rotations(Index group, int lane, const SimdDouble sign[3], const Symmetric9& stiffness,
                        SystemMatrix& out) const;
     template <class Visit>
