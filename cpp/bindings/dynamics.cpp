@@ -227,12 +227,21 @@ MotionResult run(Model& model, const MotionInput& input, bool gradients, std::si
                     [&](double at, double residual) { watch(at, residual); });
 }
 
+// Returns one vector of all stages, (stages, all dofs).
+Knots rows_of_stages(const MotionGradient& gradient, VectorXd StageAdjoint::* of) {
+    Knots rows(gradient.stages.size(), gradient.stages.empty() ? 0 : (gradient.stages[0].*of).size());
+    for (std::size_t k = 0; k < gradient.stages.size(); ++k)
+        rows.row(static_cast<Eigen::Index>(k)) = (gradient.stages[k].*of).transpose();
+    return rows;
+}
+
 py::dict back(Model& model, const MotionInput& input, const MotionResult& motion, const Array& by_positions,
               const Array& by_edge_rotations, const Array& by_velocities, const Knots& by_driving,
-              bool by_rest, const py::object& progress) {
+              bool by_rest, bool stages, const py::object& progress) {
     const Watch watch(progress);
     GradientsByStates by;
     by.wants_rest = by_rest;
+    by.wants_stages = stages;
     const VectorXd no_rotations = VectorXd::Zero(model.bodies().n_edges());
     const py::ssize_t n_v = model.nodes().n_user_vertices(), n_e = model.bodies().n_edges();
     for (py::ssize_t k = 0; k < static_cast<py::ssize_t>(motion.recorded.size()); ++k) {
@@ -277,6 +286,13 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     result["maxwell_modulus"] = by_moduli;
     result["maxwell_time"] = by_times;
     result["factorizations"] = gradient.factorizations;
+    if (stages) {
+        result["stage_adjoints"] = rows_of_stages(gradient, &StageAdjoint::lambda);
+        result["stage_states"] = rows_of_stages(gradient, &StageAdjoint::q);
+        result["stage_velocities"] = rows_of_stages(gradient, &StageAdjoint::velocity);
+        result["stage_load_parameters"] = rows_of_stages(gradient, &StageAdjoint::load_parameters);
+        result["stage_accelerations"] = rows_of_stages(gradient, &StageAdjoint::acceleration);
+    }
     return result;
 }
 
@@ -438,7 +454,8 @@ void register_dynamics(py::module_& module) {
                "none.");
     module.def("pull_back_motion", &back, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("by_positions"), py::arg("by_edge_rotations"), py::arg("by_velocities"),
-               py::arg("by_driving") = Knots(), py::arg("by_rest") = false, py::arg("progress") = py::none());
+               py::arg("by_driving") = Knots(), py::arg("by_rest") = false, py::arg("stages") = false,
+               py::arg("progress") = py::none());
     module.def("push_forward_motion", &forward, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("values"), py::arg("along"), py::arg("progress") = py::none(),
                "The derivatives of positions, edge rotations, velocities and motor forces of recorded states "

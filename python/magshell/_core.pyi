@@ -1396,6 +1396,7 @@ def pull_back_motion(
     by_velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     by_driving: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"] = ...,
     by_rest: bool = False,
+    stages: bool = False,
     progress: typing.Any = None,
 ) -> dict[str, typing.Any]: ...
 def push_forward(

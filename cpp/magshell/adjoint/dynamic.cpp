@@ -57,6 +57,7 @@ class Backward {
                                            scene_, g_.rest.asked ? &g_.rest.by_nodes : nullptr);
         if (g_.rest.asked) g_.rest.add_directions_at_start(model_, g_.positions);
         g_.values = std::move(scene_.values);
+        std::reverse(g_.stages.begin(), g_.stages.end());
         g_.factorizations = newton_.factorizations();
         return std::move(g_);
     }
@@ -189,6 +190,11 @@ class Backward {
             const auto [lambda, by_forces] =
                 back_through(algebra, at, i, record, step, substep, by_x, by_c, viscous);
             through_rates(algebra, lambda, by_forces, v, w, by);
+            if (by_.wants_stages) {
+                const double there = substep.begin + tableau.time(i) * fraction;
+                g_.stages.push_back(
+                    {lambda, record.stages[i].q, v, w, input_.load_parameters_at(step, there)});
+            }
 
             by_dt += by.dt;
             g_.positions += by.x_hat;

@@ -17,6 +17,12 @@
 
 namespace magshell {
 
+/// The adjoint of a stage and its motion, of all dofs: forces f on the residual of the stage would change the loss by lambda . f.
+struct StageAdjoint {
+    VectorXd lambda, q, velocity, acceleration;
+    LoadParameters load_parameters;
+};
+
 /// The gradient of a loss by all inputs of a motion.
 struct MotionGradient {
     VectorXd positions, velocities;  // at the start, of all dofs
@@ -26,6 +32,7 @@ struct MotionGradient {
     VectorXd values;                              // of the scene
     RestGradient rest;                            // if asked for
     std::vector<LoadParameters> load_parameters;  // as MotionInput::load_parameters
+    std::vector<StageAdjoint> stages;             // if asked for, the first one first
     int factorizations = 0;                       // that the adjoint took, including those of repeated steps
 };
 
@@ -34,7 +41,8 @@ struct GradientsByStates {
     std::vector<VectorXd> q, v;  // by the dofs and by the velocities
     std::vector<VectorXd>
         motor_forces;  // by the motor forces, in the order of DofMap::motor_forces; empty if the loss does not depend on them
-    bool wants_rest = false;  // whether the gradient with respect to rest positions is asked for
+    bool wants_rest = false;    // whether the gradient with respect to rest positions is asked for
+    bool wants_stages = false;  // whether the adjoints of all stages are
 };
 
 /// Returns the gradients with respect to all inputs from those with respect to the recorded states. Throws InvalidInput if the motion was

@@ -17,6 +17,7 @@ from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.loads.pressure import Pressure
 from ...model.scene.finer_scene import finer_scene
 from ...model.scene.solve_inputs import Inputs
+from ..dynamics.trajectory import Trajectory
 from ..linear.rest import RestStiffness
 from ..linear.single_response import LinearResponse
 from ..options import MixedNewton
@@ -66,24 +67,29 @@ class FinerSolution:
     @property
     def positions(self) -> np.ndarray:
         """The positions at the vertices of the coarse meshes, (n_v of the coarse meshes, 3) m."""
-        # The vertices of a coarse mesh come first in the finer one.
-        parts = zip(self.scene._bodies.spans, self.finer, strict=True)
-        rows = self.all_positions
-        return np.concatenate([rows[span.vertices][: each.coarse.n_vertices] for span, each in parts])
+        return at_coarse_vertices(self.scene, self.finer, self.all_positions)
 
     def adjoint(self, by_positions: np.ndarray) -> np.ndarray:
         """Return the adjoint of an output, all unknowns, from its derivative by the positions at coarse vertices."""
-        return self._adjoint(self.from_coarse(by_positions))
+        return self._adjoint(at_all_vertices(self.scene, self.finer, by_positions))
 
-    def from_coarse(self, rows: np.ndarray) -> np.ndarray:
-        """Return rows of all vertices, (n_v, 3), from those of coarse vertices, (n, 3): zero at new ones."""
-        full = np.zeros((self.scene.mesh.n_vertices, 3))
-        first = 0
-        for span, each in zip(self.scene._bodies.spans, self.finer, strict=True):
-            n = each.coarse.n_vertices
-            full[span.first_vertex : span.first_vertex + n] = rows[first : first + n]
-            first += n
-        return full
+
+def at_coarse_vertices(scene: Scene, finer: tuple[FinerMesh, ...], rows: np.ndarray) -> np.ndarray:
+    """Return the rows of the vertices of the coarse meshes from those of all vertices of a scene on the finer ones."""
+    # The vertices of a coarse mesh come first in the finer one.
+    parts = zip(scene._bodies.spans, finer, strict=True)
+    return np.concatenate([rows[span.vertices][: each.coarse.n_vertices] for span, each in parts])
+
+
+def at_all_vertices(scene: Scene, finer: tuple[FinerMesh, ...], rows: np.ndarray) -> np.ndarray:
+    """Return rows of all vertices of a scene on finer meshes, (n_v, 3), from those of coarse ones: zero at new ones."""
+    full = np.zeros((scene.mesh.n_vertices, 3))
+    first = 0
+    for span, each in zip(scene._bodies.spans, finer, strict=True):
+        n = each.coarse.n_vertices
+        full[span.first_vertex : span.first_vertex + n] = rows[first : first + n]
+        first += n
+    return full
 
 
 def finer_solution(result: Equilibrium | LinearResponse, finer: tuple[FinerMesh, ...]) -> FinerSolution:
@@ -100,8 +106,13 @@ def finer_solution(result: Equilibrium | LinearResponse, finer: tuple[FinerMesh,
     return solved(result, made, inputs, finer)
 
 
-def positions_of(result: Equilibrium | LinearResponse) -> np.ndarray:
-    """Return the positions of a result as an array in double precision, without gradients, (n_v, 3) m."""
+def positions_of(result: Equilibrium | LinearResponse | Trajectory, index: int = 0) -> np.ndarray:
+    """Return the positions of a result as an array in double precision, without gradients, (n_v, 3) m.
+
+    index: of a recorded state of a motion.
+    """
+    if isinstance(result, Trajectory):
+        return np.asarray(detached(result.positions), dtype=np.float64)[index]
     if isinstance(result, Equilibrium):
         return np.asarray(result.scene._model.positions(result._state))
     moved = np.asarray(detached(result.displacements), dtype=np.float64)

@@ -20,8 +20,9 @@ from ...model.solids.solid import Solid
 from ..linear.response import linear_response
 from ..linear.single_response import LinearResponse
 from ..statics.equilibrium import Equilibrium
+from .contributions import n_elements
 from .enriched import equilibrium_on, load_keywords, positions_of
-from .error_estimate import ErrorEstimate, check_result, error_estimate, n_elements, planes_of
+from .error_estimate import ErrorEstimate, check_static, error_estimate, planes_of
 from .output_value import Output, PositionsOfResult
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def refined_for(
     >>> bool(abs(found.value - 0.04) < 5e-5), bool(abs(bent.positions[tip, 2].mean() - 0.04) > 5e-5)
     (True, True)
     """
-    check_result(result)
+    check_static(result)
     tolerance = positive("tolerance", "", tolerance)
     max_unknowns = count("max_unknowns", max_unknowns)
     max_rounds = count("max_rounds", max_rounds, 0)

@@ -56,6 +56,7 @@ class MotionInputs:
     keep: Any
     memory_budget: int
     time_steps: TimeSteps
+    solver: Newton
 
     def __init__(
         self,
@@ -72,7 +73,7 @@ class MotionInputs:
         chosen: list[float] | None = None,
         fine_faces_of: Values | None = None,
     ):
-        self.inputs, self.integrator = inputs, integrator
+        self.inputs, self.integrator, self.solver = inputs, integrator, solver
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
         if self.record_every > self.steps:
             raise ValueError(
@@ -109,7 +110,11 @@ class MotionInputs:
             if name in SOLVE_KEYWORDS and SOLVE_KEYWORDS[name].varies
         }
         self._load_parameters = {name: self._of_keyword(each) for name, each in self._schedules.items()}
-        self._scheduled = ScheduledValues(self, list(schedules))
+        schedules = list(schedules)
+        self._scheduled = ScheduledValues(self, schedules)
+        self.varying: tuple[str, ...] = tuple(
+            f"{each.name} of a {type(each.owner).__name__}" for each in schedules
+        )
         self.interrupted: bool = False
         if fine_faces_of is not None:
             self.inputs = keeping_fine_faces(self.inputs, fine_faces_of)

@@ -18,6 +18,13 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class AtTimePoints:
+    """A value as it was in another motion of the same steps: its rows at all time points, (time points, *row)."""
+
+    rows: np.ndarray
+
+
+@dataclass(frozen=True)
 class Schedule:
     """One value prescribed over the time of a motion, a parameter of an object or a keyword of ms.simulate.
 
@@ -57,6 +64,8 @@ class Schedule:
     def at(self, points: TimePoints) -> Any:
         """Return the value at all time points, (time points, *row). Raises ValueError if it has none of the forms above."""
         name, unit, row, value = self.name, self.unit, self.row, self.value
+        if isinstance(value, AtTimePoints):
+            return value.rows
         if callable(value):
             return self._called(points)
         shape = shape_of(f"{name} [{unit}]", value)

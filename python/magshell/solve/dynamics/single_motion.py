@@ -42,6 +42,7 @@ from ..options import (
     ProjectiveDynamics,
     as_adjoint_storage,
 )
+from .conditions import MotionConditions
 from .differentiable_state import DifferentiableState
 from .motion_inputs import MotionInputs
 from .schedule import split_schedules
@@ -348,6 +349,7 @@ def _trajectory(motion_inputs: MotionInputs, found, wall_time: float, known=None
         _driving=driving,
         _rest=motion_inputs.inputs.given_rest,
         _tensors=motion_inputs.tensors_in_states(after),
+        _conditions=MotionConditions.of(motion_inputs),
     )
 
 

@@ -188,6 +188,7 @@ class Trajectory(AnimateMixin, OfOneBody):
     _tensors: Any = field(
         repr=False, default=None
     )  # {(object or None, name): (tensor, whether a row is a state)}
+    _conditions: Any = field(repr=False, default=None)  # MotionConditions; None in copies and files
 
     def __copy__(self) -> Trajectory:
         return self  # immutable
@@ -202,7 +203,7 @@ class Trajectory(AnimateMixin, OfOneBody):
             if isinstance(now.motion, ObstaclePath | ReadPath)
         }
         values = {**self._values.to_state(), "paths": paths}
-        return {**plain_arrays(vars(self)), "_values": values, "_tensors": None}
+        return {**plain_arrays(vars(self)), "_values": values, "_tensors": None, "_conditions": None}
 
     def __setstate__(self, state: dict[Any, Any]) -> None:
         values = Values.from_state(state["scene"], state["_values"])
