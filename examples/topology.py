@@ -13,11 +13,15 @@ What comes out: matter and magnetization found together do better than each of t
 straight strip of the same volume. The design is not robust: its eroded form has lost thin members. How to find one that is,
 says docs/how-to/topology.md.
 
-Run it: prints a summary and writes pictures into out/. `main(refined=(256, 128))` goes on with the search on 65,536 faces.
+Run it: prints a summary and writes pictures into out/. `python examples/topology.py --finest` goes on with the search on
+16,384 and then on 65,536 faces. Of these 12 iterations took 270 s and 3.1 GB on one thread, and the sum of both heights went
+from 22.58 to 22.80 mm (measured once).
 """
 
 from __future__ import annotations
 
+import argparse
+import functools
 import math
 import resource
 import time
@@ -35,13 +39,14 @@ import magshell as ms
 SHARPNESSES = (2.0, 4.0, 8.0, 16.0)
 START = 0.5  # the density of all faces at the start
 AROUND = 0.25 * math.pi  # of the vertical, in which the field's angle is sought
+FINEST = (((128, 64), 6), ((256, 128), 12))  # cells of finer meshes, and the iterations on each
 
 
-def main(cells=(48, 24), iterations=12, alone=True, refined=None, refined_iterations=6) -> dict:
+def main(cells=(48, 24), iterations=12, alone=True, refined=()) -> dict:
     """Return the designs and their heights, in SI units.
 
     iterations: at each sharpness. alone: whether the topology and the magnetization are also sought without each other.
-    refined: cells of a finer mesh, on which the search goes on at the last sharpness.
+    refined: (cells, iterations) of finer meshes, on which the search goes on at the last sharpness, one after another.
     """
     arm = Arm(cells)
     both = search(arm, iterations)
@@ -49,9 +54,8 @@ def main(cells=(48, 24), iterations=12, alone=True, refined=None, refined_iterat
     if alone:
         designs["topology alone"] = search(Arm(cells), iterations, magnetization=False)
         designs["magnetization alone"] = search(Arm(cells), iterations, topology=False)
-    if refined is not None:
-        fine = Arm(refined)
-        designs["both, refined"] = search(fine, refined_iterations, start=on_finer_mesh(arm, both, fine))
+    if refined:
+        designs["both, refined"] = on_finer_meshes(arm, both, refined)
     return {"designs": designs, "forms": forms(arm, both), "volume": VOLUME, "faces": arm.mesh.n_faces}
 
 
@@ -104,6 +108,18 @@ def on_finer_mesh(arm: Arm, design: dict, fine: Arm) -> tuple[torch.Tensor, torc
     return design["variables"][nearest], design["directions"][nearest], angle
 
 
+def on_finer_meshes(arm: Arm, design: dict, refined) -> dict:
+    """Return the design at which the search ends on the last of finer meshes, from one on a coarse mesh.
+
+    refined: (cells, iterations) of the meshes.
+    """
+    for cells, iterations in refined:
+        fine = Arm(cells)
+        design = search(fine, iterations, start=on_finer_mesh(arm, design, fine))
+        arm = fine
+    return design
+
+
 def evaluated(
     arm: Arm, variables: torch.Tensor | None, directions: torch.Tensor, angle: torch.Tensor
 ) -> dict:
@@ -152,4 +168,7 @@ def write(result: dict, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    run(main, summary, write)
+    arguments = argparse.ArgumentParser(description="Find an arm of magnetized matter.")
+    arguments.add_argument("--finest", action="store_true", help="go on with the search on 65,536 faces")
+    finest = arguments.parse_args().finest
+    run(functools.partial(main, alone=False, refined=FINEST) if finest else main, summary, write)

@@ -73,6 +73,15 @@ def test_search_goes_on_from_a_coarse_design_on_a_finer_mesh(result) -> None:
     assert 1e3 * found["heights"].sum() > 20.0
 
 
+def test_search_goes_on_from_mesh_to_finer_mesh(result) -> None:
+    """Check that the design of each mesh starts the search on the next."""
+    both = result["designs"]["both"]
+    fine = example.on_finer_meshes(example.Arm((24, 12)), both, (((32, 16), 2), ((34, 17), 2)))
+    assert len(fine["densities"]) == 2 * 34 * 17
+    assert len(fine["history"]) >= 2
+    assert 1e3 * fine["heights"].sum() > 20.0
+
+
 def test_topology_pictures_are_written(result, tmp_path) -> None:
     example.write(result, tmp_path)
     assert {path.name for path in tmp_path.glob("*.png")} == {"topology.png", "topology_arm.png"}
