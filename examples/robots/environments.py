@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from magshell.envs.action import Action
-from magshell.envs.environment import Environment
-from magshell.envs.library import require_gymnasium
+from magshell.envs.environment import Environment, require_gymnasium
 from magshell.envs.parametric_action import ParametricAction
 from magshell.solve.options import ImplicitEuler
 from robots.cell_gripper import SPEED, CellGripper

@@ -132,9 +132,9 @@ from .output.results.surface_files import write_surface
 from .output.results.tables import to_pandas, to_xarray
 from .solve.accuracy.error_estimate import ErrorEstimate, error_estimate
 from .solve.accuracy.refined_for import RefinedResult, refined_for
+from .solve.dynamics.batch import TrajectoryBatch
 from .solve.dynamics.simulate import simulate
 from .solve.dynamics.trajectory import MotionState, Trajectory
-from .solve.dynamics.trajectory_batch import TrajectoryBatch
 from .solve.linear.buckling import Buckling, linear_buckling
 from .solve.linear.response import linear_response
 from .solve.linear.response_batch import LinearResponseBatch
@@ -151,11 +151,10 @@ from .solve.options import (
     Newton,
     ProjectiveDynamics,
 )
-from .solve.statics.branch import Branch
 from .solve.statics.critical_point import CriticalPoint
 from .solve.statics.energies_at import energies, energy, forces, free_motions, hessian
 from .solve.statics.equilibria import EquilibriumSet
-from .solve.statics.equilibrium import Equilibrium
+from .solve.statics.equilibrium import Branch, Equilibrium
 from .solve.statics.equilibrium_batch import EquilibriumBatch
 from .solve.statics.extrapolation import Extrapolation, richardson_extrapolation
 from .solve.statics.magnetic_state import MagneticState, field_of

@@ -5,8 +5,7 @@ import pytest
 
 import magshell as ms
 from magshell import shapes
-from magshell.mesh.generate._bcc_lattice import lattice_inside
-from magshell.mesh.generate._stuffing import Cuts, stuffed
+from magshell.mesh.generate._stuffing import Cuts, lattice_inside, stuffed
 from magshell.mesh.generate._tet_cells import oriented
 from magshell.mesh.tetrahedra.quality import TetQuality
 from magshell.mesh.topology import face_table

@@ -12,8 +12,7 @@ from .._input.quantity import quantity
 from .._input.tensors import detached, positive_number, real_tensor, require_torch, tensor_of
 from . import density
 from .outlines.borders import Circle, ClosedSpline, Polygon, Slit
-from .outlines.displaced import outline
-from .outlines.following import with_boundary
+from .outlines.following import outline, with_boundary
 from .outlines.meshed_outline import MeshedOutline
 
 if TYPE_CHECKING:

@@ -1,11 +1,13 @@
-"""One search for a printable magnetization: its stages, and how it continues after a stop."""
+"""One search for a printable magnetization: its stages, and the checkpoint file from which it continues after a stop."""
 
 from __future__ import annotations
 
 import copy
+import glob
 import time
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +15,13 @@ import numpy as np
 from .._input.tensors import require_torch
 from .._runtime.log import log
 from ..errors import DesignRejected, Interrupted, ObjectiveFailed
+from .configuration import as_stored, changes, decoded, encoded, load, save
 from .jump_policies import jumps_accepted, offering
 from .minimize import minimize
 from .objective_value import Answer
 from .objectives import printable
-from .printable_checkpoint import PrintableCheckpoint
 from .printable_minimum import PrintableMinimum, PrintableStage
+from .printable_set import PrintableSet
 from .printed_faces import PrintedFaces
 from .tabu_search import Exchanges
 
@@ -365,3 +368,51 @@ def _optimizer(components, lower, upper):
     from .optim import LBFGS  # imports torch
 
     return LBFGS([components], lower=lower, upper=upper, max_evaluations=_LINE_SEARCH)
+
+
+_PARTS = ("configuration", "faces", "stateful", "history", "search", "exchanges")
+
+
+class PrintableCheckpoint:
+    """The checkpoint of one search, or none if `path` is None.
+
+    It stores the ink, the number of faces and the options, which must be the same when the search is resumed.
+    """
+
+    def __init__(self, path: str | Path | None, ink: PrintableSet, n_faces: int, options: dict[str, Any]):
+        self.path: Path | None = None if path is None else Path(path)
+        ink_has = {name: getattr(ink, name) for name in ("strength", "directions", "levels", "frames")}
+        self._configuration: dict[str, Any] = as_stored({"n_faces": n_faces, **ink_has, **options})
+
+    def save(self, **parts: Any) -> None:
+        """Write these parts of the search, and remove the files of stages that they contain."""
+        if self.path is not None:
+            held = {name: encoded(part, f"the search's {name}") for name, part in parts.items()}
+            save(self.path, {**held, "configuration": self._configuration})
+            for number in range(len(parts["history"])):
+                self.of_stage(number).unlink(missing_ok=True)
+
+    @property
+    def there(self) -> bool:
+        """Return whether the file exists."""
+        return self.path is not None and self.path.exists()
+
+    def load(self) -> dict[str, Any]:
+        """Return the parts that were saved. Raises ValueError if they are those of a search with other options."""
+        contents = load(self.path, _PARTS)
+        if changed := changes(contents["configuration"], self._configuration):
+            raise ValueError(
+                f"the checkpoint is of a search with other options: {'; '.join(changed)}. Resume with those of the "
+                "checkpoint, or begin anew with another file"
+            )
+        return {name: decoded(contents[name]) for name in _PARTS if name != "configuration"}
+
+    def clear(self) -> None:
+        """Remove files that stages of another search have left."""
+        if self.path is not None:
+            for file in self.path.parent.glob(f"{glob.escape(self.path.name)}.stage*"):
+                file.unlink()
+
+    def of_stage(self, number: int) -> Path | None:
+        """Return the path of the checkpoint within a stage, in the same folder."""
+        return None if self.path is None else self.path.with_name(f"{self.path.name}.stage{number}")

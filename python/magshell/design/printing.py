@@ -13,9 +13,8 @@ from .._input.tensors import detached, require_torch
 from .._runtime.progress import progress_bar
 from ..errors import Interrupted, ObjectiveFailed
 from .jump_policies import checked_stateful
-from .printable_checkpoint import PrintableCheckpoint
 from .printable_minimum import PrintableMinimum, PrintableStage
-from .printable_search import PrintableSearch, Stopped
+from .printable_search import PrintableCheckpoint, PrintableSearch, Stopped
 from .printable_set import PrintableSet
 from .printed_faces import PrintedFaces
 

@@ -18,7 +18,7 @@ from .configuration import as_stored, decoded, encoded
 from .jump_policies import checked_stateful, jumps_accepted, offering
 from .minimum import MinimizeResult, Record, conflict, effort_in_words, reason_of, total
 from .objective_value import Answer
-from .optim.stagnation import STAGNATION
+from .optim.sample import STAGNATION
 from .resume import check_objective, check_same
 
 if TYPE_CHECKING:

@@ -28,13 +28,25 @@ from .action import Action
 from .bounds import Bounds
 from .differentiable import EnvState, as_result, first_state, next_state
 from .frames import Camera
-from .library import require_gymnasium
 from .snapshot import Snapshot
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     import gymnasium
 
     from .._input.kinds import EnvActuator
+
+
+def require_gymnasium(what: str) -> ModuleType:
+    """Return the gymnasium module. Raises ImportError with the command that installs it; what: the feature that needs
+    it."""
+    try:
+        import gymnasium
+    except ImportError as error:
+        raise ImportError(f'{what} needs gymnasium: pip install "magshell[gym]"') from error
+    return gymnasium
+
 
 if not TYPE_CHECKING:
     gymnasium = require_gymnasium("envs.Environment")

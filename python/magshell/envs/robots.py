@@ -21,8 +21,7 @@ from ..model.solids.solid import Solid
 from ..model.supports.supports import Clamp, Pin
 from ..solve.options import ImplicitEuler
 from .action import Action
-from .environment import Environment
-from .library import require_gymnasium
+from .environment import Environment, require_gymnasium
 from .parametric_action import ParametricAction
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ import numpy as np
 from .._input.arrays import count
 from .._runtime.worker_threads import Outcome, WorkerThreads, checked_threads
 from ..errors import Interrupted
-from .environment import Environment
-from .library import require_gymnasium
+from .environment import Environment, require_gymnasium
 
 if TYPE_CHECKING:
     import gymnasium

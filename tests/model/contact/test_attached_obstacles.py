@@ -7,7 +7,7 @@ import pytest
 
 import magshell as ms
 from magshell import obstacles as ob
-from magshell.output.results.surroundings import surroundings_of
+from magshell.output.results.state import surroundings_of
 
 G = 9.81
 MESH = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
-from magshell.model.fields.magnet_overlap import describe_magnet_overlap
+from magshell.model.fields.magnets import describe_magnet_overlap
 
 CUBOID = ms.CuboidMagnet((0.02, 0.03, 0.04), (0, 0, 1e6), center=(0.1, 0, 0), rotation=(0, 0, np.pi / 2))
 CYLINDER = ms.CylinderMagnet(0.01, 0.04, (0, 0, 1e6), center=(0, 0.1, 0), rotation=(np.pi / 2, 0, 0))

@@ -9,7 +9,7 @@ import pytest
 
 import magshell as ms
 from magshell.output.live.follower import Follower
-from magshell.output.live.patches import LEVELS, patches
+from magshell.output.live.stage import LEVELS, patches
 from magshell.output.plot.colors import Scalar, scale_colors
 
 pytest.importorskip("viser")

@@ -5,8 +5,7 @@ import pytest
 
 import magshell as ms
 from magshell.output.plot import colors
-from magshell.output.plot.outlines import outline_edges
-from magshell.output.plot.silhouettes import silhouettes, turning_edges
+from magshell.output.plot.outlines import outline_edges, silhouettes, turning_edges
 from magshell.output.results.spring_surfaces import creases_of
 from magshell.output.results.state import states_of
 

@@ -14,8 +14,7 @@ from ..._input.tensors import is_tensor
 from . import box as boxes
 from .box import Box
 from .iterate import Iterate, Restoring, as_array, as_tensor
-from .sample import Sample
-from .stagnation import STAGNATION
+from .sample import STAGNATION, Sample
 
 
 class BoxOptimizer(Iterate, torch.optim.Optimizer, ABC):

@@ -15,8 +15,7 @@ from .base import BoxOptimizer, positive_count
 from .box import Box
 from .cauchy import Curvature, cauchy_step, shows_curvature, subspace_step, updated_diagonal
 from .line_search import Probe, strong_wolfe
-from .sample import Sample
-from .stagnation import STAGNATION
+from .sample import STAGNATION, Sample
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers

@@ -144,3 +144,6 @@ def require_finite(label: str, values: np.ndarray) -> None:
         raise FloatingPointError(
             f"{label} is {values[entry]}{where}; the parameters are left where they were"
         )
+
+
+STAGNATION = "the optimizer finds no lower design, to rounding"

@@ -13,8 +13,7 @@ from ..._input.scalars import positive
 from ...errors import DesignRejected
 from .base import BoxOptimizer, positive_count
 from .box import Box
-from .sample import Sample
-from .stagnation import STAGNATION
+from .sample import STAGNATION, Sample
 
 # [Nocedal and Wright 2006, algorithm 4.1]: a step is taken if the decrease is at least the first fraction [-] of the one
 # expected; the radius shrinks to a quarter below the second, and doubles above the third.

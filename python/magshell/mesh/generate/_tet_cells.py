@@ -1,7 +1,7 @@
 """Division of hexahedral cells and prisms into tetrahedra whose faces match between neighbours.
 
 The eight corners of a cell are numbered in binary: corner 1 is next to corner 0 along the first axis, 2 along the second, 4
-along the third.
+along the third. Ten-node tetrahedra of round solids get curved edges.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._input.quantity import array_of
+from ..tetrahedra.refine import curved
+from ..tetrahedra.tet_mesh import TetMesh
 from ..topology import MIRRORED
 
 if TYPE_CHECKING:
@@ -144,3 +146,24 @@ def oriented(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     a, b, c = np.moveaxis(points[tetrahedra[:, 1:]] - points[tetrahedra[:, :1]], 1, 0)
     inverted = np.einsum("ti,ti->t", np.cross(a, b), c) < 0
     return np.where(inverted[:, None], tetrahedra[:, MIRRORED[:4]], tetrahedra)
+
+
+def round_order(mesh: TetMesh, order: int, axes: tuple[int, ...]) -> TetMesh:
+    """Return the mesh with tetrahedra of the given order, 1 or 2, whose curved edges follow round surfaces.
+
+    The distance of a midside node from the origin, measured in the coordinates `axes`, is the mean of the distances of the
+    edge's ends. So an edge on a cylinder or a sphere around the origin becomes an arc.
+    """
+    if order == 1:
+        return mesh
+    across = list(axes)
+    radii = np.linalg.norm(mesh.rest_positions[:, across], axis=1)
+
+    def project(midpoints: np.ndarray, edges: np.ndarray) -> np.ndarray:
+        projected = midpoints.copy()
+        wanted, current = radii[edges].mean(axis=1), np.linalg.norm(midpoints[:, across], axis=1)
+        factor = np.divide(wanted, current, out=np.ones_like(wanted), where=current > 1e-9 * wanted)
+        projected[:, across] *= factor[:, None]
+        return projected
+
+    return curved(mesh, project)

@@ -10,8 +10,7 @@ from ..._input.arrays import count
 from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
 from ..tetrahedra.tet_mesh import TetMesh
-from ._round import round_order
-from ._tet_cells import check_order, check_size, oriented
+from ._tet_cells import check_order, check_size, oriented, round_order
 
 
 @grouped()

@@ -12,8 +12,7 @@ from ..._runtime.solver_entry_point import grouped
 from ..groups import Members, members, row_numbers
 from ..tetrahedra.tet_mesh import TetMesh
 from ..triangles.triangle_mesh import TriangleMesh, checked_mesh
-from ._round import round_order
-from ._tet_cells import check_order, check_size, checked_cells, oriented, prisms
+from ._tet_cells import check_order, check_size, checked_cells, oriented, prisms, round_order
 from .flat import disk
 
 _FLAT = 1e-9  # [-] largest range of z of a flat mesh, relative to the diagonal of its bounding box

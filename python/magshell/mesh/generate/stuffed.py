@@ -17,8 +17,7 @@ from ..shapes import Shape
 from ..signed_distance import Distance, checked_distance
 from ..tetrahedra.tet_mesh import TetMesh
 from ..topology import FACES, face_table, nonmanifold_edges, nonmanifold_vertices, outer_faces
-from ._bcc_lattice import lattice_inside
-from ._stuffing import Cuts, stuffed
+from ._stuffing import Cuts, lattice_inside, stuffed
 from ._tet_cells import check_order, check_size, oriented
 
 if TYPE_CHECKING:

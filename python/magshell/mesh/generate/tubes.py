@@ -7,13 +7,13 @@ import numpy as np
 from ..._input.scalars import positive
 from ..._runtime.solver_entry_point import grouped
 from ..tetrahedra.tet_mesh import TetMesh
-from ._round import round_order
 from ._tet_cells import (
     check_diagonals,
     check_order,
     check_size,
     checked_cells,
     lattice,
+    round_order,
     six_each,
     twenty_four_each,
 )

@@ -38,11 +38,9 @@ from .named_groups import (
     lost_members,
     warn_of_left_out,
 )
-from .obj import read_obj
 from .ply import read_ply, write_ply
-from .stl import solids_of_stl
+from .surface_formats import TriangleContent, read_obj, solids_of_stl
 from .tetrahedra import TetContent, TetFields, cells_and_data, tetrahedra_of
-from .triangles import TriangleContent
 
 if TYPE_CHECKING:
     from ..._input.kinds import FilePath, Numbers

@@ -6,9 +6,8 @@ A shape is a function of points (n, 3) m that returns distances (n,) m, negative
 intersection, `a - b` the difference.
 """
 
-from .combined import difference, intersection, smooth_union, union
 from .primitives import ball, box, capsule, cylinder, ellipsoid, half_space
-from .shape import Shape
+from .shape import Shape, difference, intersection, smooth_union, union
 
 __all__ = [
     "Shape",

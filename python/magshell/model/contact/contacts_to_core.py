@@ -12,7 +12,7 @@ from ... import _core
 from ..._input.selections import indices
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import MeshQualityWarning
-from ..bodies.words import called
+from ..bodies.bodies import called
 from ..rigid.rigid import RigidBody
 from ..solids.solid import Solid
 from .attached_obstacles import positioned

@@ -1,5 +1,5 @@
-"""Warns of sizes and material values that no soft body has, most often a mistaken unit; once per scene and kind of
-value.
+"""Checks a scene when it is made, and warns of what is likely a mistake: above all sizes and material values that no soft
+body has, most often a mistaken unit; once per scene and kind of value.
 
 A mistaken unit is in every entry. If some faces are within the limits and others beyond, as a fit of a modulus face by face
 tries on its way, or a design that thins faces out to nothing, no unit is mistaken, and no warning is issued.
@@ -14,7 +14,11 @@ import numpy as np
 
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import SusceptibilityWarning, UnitWarning
+from ..contact.contacts_to_core import check_neighbours
+from ..loads.custom_energy import CustomEnergy
 from ..shells.shell import Shell
+from ..solids.mean_volume import warn_of_thin_regions
+from ..solids.solid import Solid
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -181,3 +185,42 @@ def _warn(scene: Scene, kind: str, what: str, hint: str) -> None:
         return
     scene._warned_of_units.add(kind)
     warnings.warn(f"{what}: {hint} Units are SI", UnitWarning, stacklevel=callers_level())
+
+
+def check_new_scene(scene: Scene) -> None:
+    """Warn of contact between neighbours, of sizes that no body has, and of solids one cell thick.
+
+    Raises ValueError in the cases of `check_neighbours`, and for a CustomEnergy with the name of another energy.
+    """
+    _check_names(scene)
+    check_neighbours(scene, warns=True)
+    warn_of_units(scene, scene._values)
+    for span, body in zip(scene._bodies.spans, scene.bodies, strict=True):
+        if isinstance(body, Solid) and body.mean_volume:
+            warn_of_thin_regions(body.mesh, _held_vertices(scene)[span.vertices])
+
+
+def _check_names(scene: Scene) -> None:
+    """Raise ValueError if two energies would have one name in results."""
+    names = scene._model.term_names
+    for load in scene.loads:
+        if isinstance(load, CustomEnergy) and names.count(load.name) > 1:
+            custom = [
+                each for each in scene.loads if isinstance(each, CustomEnergy) and each.name == load.name
+            ]
+            other = "CustomEnergy" if len(custom) > 1 else "energy of the scene"
+            raise ValueError(
+                f"results list energies by name, but another {other} is called {load.name!r} as well: give {load!r} a name "
+                "of its own, CustomEnergy(..., name=...)"
+            )
+
+
+def _held_vertices(scene: Scene) -> np.ndarray:
+    """Return the projections onto the directions in which supports hold each vertex, (n_v, 3, 3)."""
+    bodies, constraints = scene._bodies, scene._constraints
+    found = np.zeros((len(bodies.original), 3, 3))
+    of_vertices = constraints.held_nodes[:, 0] < len(found)
+    nodes, counts = constraints.held_nodes[of_vertices, :2].T
+    columns = constraints.held_frames[of_vertices] * (np.arange(3) < counts[:, None])[:, None, :]
+    found[nodes] = columns @ np.swapaxes(columns, 1, 2)
+    return found[bodies.original]

@@ -15,9 +15,8 @@ from ..._runtime.mixins import PlotMixin
 from ..._runtime.solver_entry_point import grouped
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..actuators.actuator import Actuator
-from ..bodies.bodies import Bodies
+from ..bodies.bodies import Bodies, called
 from ..bodies.ties import Tie
-from ..bodies.words import called
 from ..contact.attached_obstacles import bodies_of_attached
 from ..contact.body_contact import BodyContact
 from ..contact.contact import Contact
@@ -48,9 +47,9 @@ from ..supports.constraints import free_rigid_motions, gather
 from ..supports.displacement_ties import DisplacementTie, EqualDisplacement, Periodic
 from ..supports.supports import Clamp, Pin, SymmetryPlane
 from .core_models import CoreModels
-from .new_scene_checks import check_new_scene
 from .own_field import OwnField, own_field_inputs
 from .parameter_layout import Layout
+from .plausible import check_new_scene
 from .scene_to_core import (
     actuator_inputs,
     body_inputs,

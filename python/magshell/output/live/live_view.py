@@ -23,8 +23,7 @@ from .follower import Follower
 from .library import quiet
 from .movable import Movable, values_of
 from .panel import Panel
-from .patches import bytes_of
-from .stage import SHOWN_SIZE, Stage
+from .stage import SHOWN_SIZE, Stage, bytes_of
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers

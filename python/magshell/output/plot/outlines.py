@@ -1,4 +1,7 @@
-"""The edges of bodies that pictures show as lines from every side: borders and sharp edges."""
+"""The edges of bodies that pictures show as lines: borders and sharp edges from every side, and silhouettes for one eye.
+
+A silhouette is a part of an edge of a closed surface behind which there is nothing, or something farther away.
+"""
 
 from __future__ import annotations
 
@@ -67,3 +70,95 @@ def _without_ends(edges: np.ndarray) -> np.ndarray:
         if (still == left).all():
             return left
         left = still
+
+
+PARTS = 4  # number of parts of an edge, each of which is shown or hidden
+# [-] Distances over the mean edge length. A point this far outside an edge on the screen shows what is behind the edge.
+ASIDE = 0.05
+# A surface behind an edge that is nearer to it than this belongs to a fold, and the edge is no outline; fixed by
+# test_edges_in_front_of_a_near_surface_are_no_silhouettes.
+GAP = 0.5
+
+
+def silhouettes(state: State, eye: np.ndarray) -> np.ndarray:
+    """Return the parts of edges of closed surfaces that are outlines for the direction (3,) of the eye, (k, 2, 3) m.
+
+    Behind such a part the next surface is farther away than GAP allows, or there is none.
+    """
+    mesh, edges = state.mesh, turning_edges(state, eye)
+    if not len(edges):
+        return np.zeros((0, 2, 3))
+    step = float(mesh.edge_lengths.mean())
+    start, end = np.moveaxis(state.positions[mesh.edges[edges]], 1, 0)
+    ends = start + np.linspace(0.0, 1.0, PARTS + 1)[:, None, None] * (end - start)
+    middles = 0.5 * (ends[1:] + ends[:-1]) @ _axes(eye).T
+    points = middles[:, :, :2] + ASIDE * step * _outwards(state, edges, eye)
+    behind = _depths(state.positions[mesh.faces] @ _axes(eye).T, points.reshape(-1, 2))
+    shown = middles[:, :, 2] - behind.reshape(middles.shape[:2]) > GAP * step
+    return np.stack([ends[:-1][shown], ends[1:][shown]], axis=1)
+
+
+def turning_edges(state: State, eye: np.ndarray) -> np.ndarray:
+    """Return the numbers of the edges of closed surfaces between a face towards the eye and one away from it."""
+    mesh, interior = state.mesh, state.mesh.interior_edges
+    closed = interior[of_closed(mesh)[interior]]
+    towards = towards_eye(state, eye)[mesh.edge_faces[closed]]
+    return closed[towards[:, 0] != towards[:, 1]]
+
+
+def _axes(eye: np.ndarray) -> np.ndarray:
+    """Return a matrix (3, 3) whose rows are two unit vectors that span the screen, and the direction of the eye."""
+    right = np.cross(np.eye(3)[np.argmin(np.abs(eye))], eye)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(eye, right), eye])
+
+
+def _outwards(state: State, edges: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """Return unit vectors (k, 2) on the screen that are perpendicular to edges and point away from their faces."""
+    mesh = state.mesh
+    ends = state.positions[mesh.edges[edges]] @ _axes(eye).T
+    along = (ends[:, 1] - ends[:, 0])[:, :2]
+    across = along[:, ::-1] * (-1.0, 1.0) / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    faces = state.positions[mesh.faces[mesh.edge_faces[edges]]].mean(axis=2) @ _axes(eye).T
+    inwards = ((faces - ends.mean(axis=1, keepdims=True))[:, :, :2] * across[:, None]).sum(axis=(1, 2))
+    return -np.sign(inwards)[:, None] * across
+
+
+def _depths(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return how far towards the eye the nearest triangle is at each point (k, 2) m of the screen, (k,) m; -inf without one.
+
+    triangles: corners (m, 3, 3) m along the rows of `_axes`, so that a larger third coordinate is nearer to the eye.
+    """
+    point, triangle = _near(triangles[:, :, :2], points)
+    a, b, c = np.moveaxis(triangles[triangle], 1, 0)
+    one, other, offset = (b - a)[:, :2], (c - a)[:, :2], points[point] - a[:, :2]
+    area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = (offset[:, 0] * other[:, 1] - offset[:, 1] * other[:, 0]) / area
+        t = (one[:, 0] * offset[:, 1] - one[:, 1] * offset[:, 0]) / area
+    inside = (area != 0.0) & (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
+    found = np.full(len(points), -np.inf)
+    depths = a[:, 2] + s * (b - a)[:, 2] + t * (c - a)[:, 2]
+    np.maximum.at(found, point[inside], depths[inside])
+    return found
+
+
+def _near(triangles: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices (p,) of points, and of triangles (m, 3, 2), that share a cell of a grid on the screen.
+
+    The cells are as large as the largest triangle, so that a triangle touches four of them at most.
+    """
+    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    cell = float((high - low).max())
+    first, last = (np.floor((each - low.min(axis=0)) / cell).astype(np.int64) for each in (low, high))
+    width = int(last[:, 0].max()) + 2
+    corners = [np.where([right, up], last, first) @ (1, width) for right in (0, 1) for up in (0, 1)]
+    key, triangle = np.unique(
+        np.stack([np.concatenate(corners), np.tile(np.arange(len(triangles)), 4)], axis=1), axis=0
+    ).T
+    place = np.floor((points - low.min(axis=0)) / cell).astype(np.int64)
+    of_point = np.where((place >= 0).all(axis=1) & (place[:, 0] < width), place @ (1, width), -1)
+    begin, end = np.searchsorted(key, of_point, "left"), np.searchsorted(key, of_point, "right")
+    count = end - begin
+    entry = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + np.repeat(begin, count)
+    return np.repeat(np.arange(len(points)), count), triangle[entry]

@@ -18,7 +18,7 @@ from ..._input.scalars import positive
 from ..._runtime.files import replace_file
 from ..._runtime.solver_entry_point import grouped
 from ..results.probes import Probe
-from ..results.series_probes import probe_columns
+from ..results.series import probe_columns
 from ..results.state import State, states_of, with_times
 from ..results.tables import coordinate_of
 from ..results.units import LengthUnit, length_unit, prefixed, with_unit

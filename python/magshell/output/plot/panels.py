@@ -15,8 +15,7 @@ from . import colors, glyphs
 from .colors import Scalar, rgb
 from .cuts import Cut, Section, cut_edges, opened, section_solid
 from .limits import arrow_count
-from .outlines import outline_edges, seen
-from .silhouettes import silhouettes
+from .outlines import outline_edges, seen, silhouettes
 from .solids import Solid, arrows, ribbons, sheet
 from .style import Style
 from .surroundings import box_of, inner_solids, obstacle_solids

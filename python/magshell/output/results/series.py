@@ -1,9 +1,11 @@
-"""Series of VTU files of the states of a result, for ParaView."""
+"""Series of VTU files of the states of a result, for ParaView, with the numbers of probes as field data of each file."""
 
 from __future__ import annotations
 
+import base64
 import os
 import re
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +17,7 @@ from ..._input.arrays import named_values
 from ..._input.path_first import check_path_first
 from ..._input.quantity import quantity, shape_of
 from ..._input.tensors import detached
-from ..._runtime.files import replacing
+from ..._runtime.files import replace_file, replacing
 from ..._runtime.progress import SolveBar
 from ...mesh.io.read_write import check_field_name, write_cells, write_mesh
 from ...mesh.io.tetrahedra import cells_and_data
@@ -24,9 +26,9 @@ from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.shells.shell_stresses import ShellStresses
 from ...model.solids.solid_stresses import SolidStates
-from .probes import Probe
-from .series_probes import add_field_data, probe_columns
+from .probes import Probe, checked_probes
 from .state import State, states_of, with_times
+from .tables import is_result
 
 if TYPE_CHECKING:
     from ..._input.kinds import Fielded, FilePath, Numbers, Shown
@@ -300,3 +302,49 @@ def _contents(names: list[str], states: list[State], chosen) -> bytes:
     ]
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>'
     return "\n".join([head, *rows, "  </Collection>\n</VTKFile>\n"]).encode()
+
+
+_GRID = b"<UnstructuredGrid>"
+_BLOCK = 32768  # bytes of the blocks that meshio compresses
+
+
+def probe_columns(what: Any, probes: Probe | Sequence[Probe], positions: Any) -> dict[str, np.ndarray]:
+    """Return the numbers of probes in all states of a result, {name with unit: (n,)}.
+
+    Raises ValueError for probes of what is no result, and if a caller shows other positions than those of the result.
+    """
+    chosen = checked_probes(probes)
+    if not chosen:
+        return {}
+    if not is_result(what):
+        raise ValueError(f"probes are of one result, got a {type(what).__name__}")
+    if positions is not None:
+        raise ValueError("probes are of the result's own states: leave out positions=")
+    return {
+        f"{name} [{unit}]": np.atleast_1d(np.asarray(values, dtype=np.float64))
+        for probe in chosen
+        for name, (unit, values) in probe.columns(what).items()
+    }
+
+
+def add_field_data(path: Path, numbers: dict[str, float]) -> None:
+    """Add numbers to a VTU file as its field data, where ParaView finds them under their names."""
+    from xml.sax.saxutils import quoteattr  # late, as it loads all of urllib
+
+    arrays = [
+        f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfTuples="1" format="binary">{_packed(value)}</DataArray>'
+        for name, value in numbers.items()
+    ]
+    before, grid, after = path.read_bytes().partition(_GRID)
+    if not grid:
+        raise ValueError(f"{path.name!r} is not a VTU file of an unstructured grid")
+    data = f"<FieldData>{''.join(arrays)}</FieldData>".encode()
+    replace_file(path, lambda file: file.writelines([before, grid, data, after]))
+
+
+def _packed(value: float) -> str:
+    """Encode a number as the files of meshio do: one compressed block behind its header. Text could not be NaN."""
+    number = np.array([value], dtype=np.float64).tobytes()
+    block = zlib.compress(number)
+    header = np.array([1, _BLOCK, len(number), len(block)], dtype=np.uint32).tobytes()
+    return (base64.b64encode(header) + base64.b64encode(block)).decode()

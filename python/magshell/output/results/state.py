@@ -1,10 +1,13 @@
-"""The states of a scene that can be drawn or written, collected from meshes, bodies, scenes and results."""
+"""The states of a scene that can be drawn or written, collected from meshes, bodies, scenes and results.
+
+The fields and obstacles around the bodies are at their positions in each state.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +19,9 @@ from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ...model.bodies.body_ranges import magnetized_rows
 from ...model.bodies.joined_mesh import JoinedMesh
+from ...model.contact.attached_obstacles import positioned
 from ...model.contact.obstacles import Obstacle
+from ...model.contact.round_shapes import shapes_in
 from ...model.fields.field import AppliedField, UniformField
 from ...model.results.result_lookup import result_of
 from ...model.scene.scene import Scene
@@ -41,11 +46,11 @@ from .link_surfaces import (
 )
 from .magnets import surfaces_of
 from .spring_surfaces import creases_of, springs_at_rest, springs_of
-from .surroundings import obstacles_in, surroundings_of
 from .units import clock
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Fielded, Numbers, Shown
+    from ..._input.kinds import Fielded, Numbers, Shown, SolveResult
+    from ...model.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -451,3 +456,37 @@ def _listed(value) -> tuple[Any, ...]:
     if value is None:
         return ()
     return tuple(value) if isinstance(value, list | tuple) else (value,)
+
+
+class Surroundings(NamedTuple):
+    """The fields and obstacles of each state; a single entry for a result that has no values per state.
+
+    The shapes of contacts are not among the obstacles, as they are drawn with the rigid bodies.
+    Obstacles with a `motion` are not moved here: their position follows from the time of the state.
+    """
+
+    fields: list[tuple[AppliedField, ...]]
+    obstacles: list[tuple[Obstacle, ...]]
+
+
+def obstacles_in(scene: Scene) -> tuple[Obstacle, ...]:
+    """Return the obstacles of a scene that are not shapes of contacts."""
+    shapes = {id(each) for each in shapes_in(scene.contacts)}
+    return tuple(each for each in scene.obstacles if id(each) not in shapes)
+
+
+def surroundings_of(result: SolveResult) -> Surroundings:
+    """Return the fields and obstacles in each state of a result, or of any object with a scene."""
+    scene = result.scene
+    if not hasattr(result, "_values_at"):
+        return Surroundings([scene.fields], [obstacles_in(scene)])
+    count = len(result) if isinstance(result, Trajectory | EquilibriumPath) else 1
+    values = [result._values_at(k) for k in range(count)]
+    fields = [tuple(map(each.current, scene.fields)) for each in values]
+    own = getattr(result, "_own_points", None)
+    rows = [None] * count if own is None else np.reshape(detached(own), (count, -1, 3))
+    obstacles = [
+        tuple(positioned(scene, each.current(obstacle), row) for obstacle in obstacles_in(scene))
+        for each, row in zip(values, rows, strict=True)
+    ]
+    return Surroundings(fields, obstacles)

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..._input.quantity import quantity
 from ..._runtime.files import replace_file
-from ...mesh.io.obj import write_obj
-from ...mesh.io.stl import write_stl
+from ...mesh.io.surface_formats import write_obj, write_stl
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.thickened import thickened

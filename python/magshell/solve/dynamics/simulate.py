@@ -17,7 +17,7 @@ from .trajectory import MotionState, Trajectory
 if TYPE_CHECKING:
     from ..._input.kinds import InTime, Numbers
     from ..statics.equilibrium import Equilibrium
-    from .trajectory_batch import TrajectoryBatch
+    from .batch import TrajectoryBatch
 
 
 @overload

@@ -16,7 +16,7 @@ from ..._runtime.progress import stop_at_once
 from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
-from ...model.fields.magnet_overlap import describe_magnet_overlap
+from ...model.fields.magnets import describe_magnet_overlap
 from ...model.scene.field_sampling import sampling_errors, warn_of_elements, warn_of_sampling
 from ...model.scene.fine_faces import fine_faces
 from ...model.scene.replacements import requested

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...model.bodies.words import called
-from ...model.fields.magnet_overlap import describe_magnet_overlap
+from ...model.bodies.bodies import called
+from ...model.fields.magnets import describe_magnet_overlap
 from ...model.shells.obtuse_faces import describe_faces
 from ...model.supports.constraints import free_rigid_motions
 from .solve_log import SolveLog, SolveStep, steps_of

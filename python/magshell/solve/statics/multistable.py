@@ -18,7 +18,7 @@ from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
 from ...model.scene.scene import Scene
 from ..options import MixedNewton, Newton
-from .designs import numbers_only
+from .continued import numbers_only
 from .equilibria import EquilibriumSet
 from .equilibrium import Equilibrium
 from .single_solve import Search, Solution, find, inputs_of, solve

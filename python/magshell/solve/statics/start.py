@@ -10,7 +10,7 @@ from ..._input.quantity import quantity
 from ..._input.tensors import to_array
 from ...model.contact.contacts_to_core import check_outside
 from ...model.rigid.equimomental_points import check_rigid
-from ...model.scene.reshaped_states import renumbered_state
+from ...model.scene.reshaped import renumbered_state
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ...model.solids.solid import Solid
