@@ -88,10 +88,13 @@ def buckling(scene, values, **given):
 
 def buckling_about(scene, values, start=None, **given):
     """Return the lowest buckling factor of the way from half of the loads, by which the sheet is bent, to these."""
-    factor, field = (as_tensor(given[name]) for name in ("load_factor", "applied_flux_density"))
-    half = {"load_factor": 0.5 * factor, "applied_flux_density": 0.5 * field}
+    half = {
+        name: 0.5 * as_tensor(given[name])
+        for name in ("load_factor", "applied_flux_density")
+        if name in given
+    }
     rest = ms.equilibrium(scene, values=values, start=start, **{**given, **half})
-    towards = {name: given[name] for name in ("load_factor", "gravity_factor", "applied_flux_density")}
+    towards = {name: given[name] for name in (*half, "gravity_factor") if name in given}
     return numbers(ms.linear_buckling(rest.scene, rest, **towards).factors)
 
 
@@ -218,7 +221,15 @@ def vibrating_with_own_field() -> Kind:
     return Kind(scene, inputs, solve=frequencies, fixed=EXACT, reach=REACH)
 
 
+def buckling_with_own_field() -> Kind:
+    """Build two flaps in each other's field that are pressed along their length."""
+    scene = stiff_pair((-5.0, 0.2, 0.1), cells=(2, 1))
+    inputs = {"load_factor": 0.9, "remanent_magnetization": stiff_pair_magnetization(scene)}
+    return Kind(scene, inputs, solve=buckling_about, fixed=EXACT, step=2e-4, reach=REACH)
+
+
 LINEAR_MAKERS = {
+    "flaps with their own field that buckle": buckling_with_own_field,
     "flaps with their own field that vibrate": vibrating_with_own_field,
     "a sheet that vibrates about an equilibrium": vibrating_sheet,
     "a solid that vibrates about an equilibrium": vibrating_solid,

@@ -41,13 +41,15 @@ def own_field(moves: bool) -> Kind:
     return Kind(scene, inputs, fixed=EXACT, reach=REACH)
 
 
-def bodies_with_own_field() -> Kind:
-    """Build a magnetized solid, a solid with a skin, a curved six-node sheet and a sheet that carries a magnet, at rest.
+def bodies_with_own_field(moves: bool) -> Kind:
+    """Build a magnetized solid, a solid with a skin, a sheet that carries a magnet and, at rest, a curved six-node sheet.
 
-    They are small and apart, so that few pairs are near, and stiff: sheets of 1 mm and 3 MPa, 0.1 m long, found no rest.
+    They are small and apart, so that few pairs are near. At rest they are stiff: sheets of 1 mm and 3 MPa, 0.1 m long, found
+    no rest. In motion the solids are so soft, the skin so heavy and the magnets so strong that every input shows in the
+    positions; another magnet flies beside them.
     """
     rng = np.random.default_rng(31)
-    rubber = ms.StableNeoHookean(young_modulus=1e6, poisson_ratio=0.3)
+    rubber = ms.StableNeoHookean(young_modulus=2e4 if moves else 1e6, poisson_ratio=0.3)
     heavy = {"mass_density": 1.1e3, "element": "linear", "material": rubber}
     thick = {"thickness": 1.5e-3, "young_modulus": 3e6, "poisson_ratio": 0.3, "mass_density": 1e3}
     carrier = ms.meshes.rectangle(0.03, 0.012, cells=(3, 1)).transformed(translation=(0.0, 0.0, 0.03))
@@ -65,7 +67,7 @@ def bodies_with_own_field() -> Kind:
     )
     coat = ms.Skin(
         thickness=1e-3,
-        mass_density=1e3,
+        mass_density=6e3 if moves else 1e3,
         faces=upper.faces_at(z=0.055),
         remanent_magnetization=(2e4, -3e4, 4e4),
     )
@@ -83,7 +85,7 @@ def bodies_with_own_field() -> Kind:
         mass=2e-4,
         inertia=np.array([1.2e-8, 0.9e-8, 1.5e-8]),
         center=carrier.rest_positions[carried].mean(axis=0) + np.array([5e-4, 1e-3, 2e-3]),
-        magnetic_moment=(1e-3, 5e-4, 3e-3),
+        magnetic_moment=(5e-3, 2.5e-3, 1.5e-2) if moves else (1e-3, 5e-4, 3e-3),
     )
     supports = [
         ms.Clamp(carrier.edges_at(x=0.0), body=sheet),
@@ -91,20 +93,33 @@ def bodies_with_own_field() -> Kind:
         ms.Pin(upper.vertices_at(x=upper.rest_positions[:, 0].min()), body=coated),
         ms.Clamp(lower.mesh.edges_at(x=arched[:, 0].min()), body=lower),
     ]
+    bodies = [sheet, block, coated, lower, magnet]
+    if moves:  # as much again would take too long
+        bodies.remove(lower)
+        supports.pop()
+        place = {"center": (0.045, 0.006, 0.045), "magnetic_moment": (2e-2, 5e-3, -1e-2)}
+        bodies.append(ms.RigidBody(mass=3e-4, inertia=(0.7e-8, 1.0e-8, 1.4e-8), **place))
     scene = ms.Scene(
-        [sheet, block, coated, lower, magnet],
+        bodies,
         supports=supports,
         field=ms.UniformField(),
         own_field=ms.OwnField(),
-        gravity=(0.2, 0.1, -2.0),
+        gravity=(2.0, 1.0, -9.8) if moves else (0.2, 0.1, -2.0),
+        allow_rigid_motions=moves,
     )
     inputs = {"applied_flux_density": np.array([1e-3, -2e-3, 3e-3])}
-    return Kind(scene, inputs, fixed=EXACT, reach=REACH)
+    if not moves:
+        return Kind(scene, inputs, fixed=EXACT, reach=REACH)
+    fixed = {"steps": 2, "integrator": ms.ImplicitEuler(), "progress": False, **EXACT}
+    return Kind(scene, {"time_step": 4e-3, **inputs}, ms.simulate, fixed=fixed, reach=REACH)
 
 
-def stiff_pair() -> ms.Scene:
-    """Build two clamped flaps above each other, of few degrees of freedom, so that eigenvalue problems take little time."""
-    mesh = ms.meshes.rectangle(0.02, 0.006, cells=(3, 1))
+def stiff_pair(tip_load=(0.0, 0.0, 0.0), cells=(3, 1)) -> ms.Scene:
+    """Build two clamped flaps above each other, of few degrees of freedom, so that eigenvalue problems take little time.
+
+    tip_load: N/m on the free end of each.
+    """
+    mesh = ms.meshes.rectangle(0.02, 0.006, cells=cells)
     meshes = [mesh, mesh.transformed(translation=(1e-3, 5e-4, 4e-3))]
     flaps = [
         ms.Shell(each, thickness=4e-4, young_modulus=modulus, poisson_ratio=0.3, mass_density=2e3)
@@ -114,7 +129,12 @@ def stiff_pair() -> ms.Scene:
         ms.Clamp(each.edges_at(x=each.rest_positions[:, 0].min()), body=flap)
         for each, flap in zip(meshes, flaps, strict=True)
     ]
-    return ms.Scene(flaps, supports=supports, own_field=ms.OwnField())
+    loads = [
+        ms.EdgeLoad(each.edges_at(x=each.rest_positions[:, 0].max()), tip_load, body=flap)
+        for each, flap in zip(meshes, flaps, strict=True)
+        if np.any(tip_load)
+    ]
+    return ms.Scene(flaps, supports=supports, loads=loads, own_field=ms.OwnField())
 
 
 def stiff_pair_magnetization(scene) -> np.ndarray:

@@ -225,13 +225,41 @@ def test_buckling_factors_equal_those_of_a_dense_decomposition():
     np.testing.assert_allclose(found.factors, 1.0 / inverses[::-1][:3], rtol=1e-5)
 
 
-def test_buckling_factors_have_no_gradient_with_the_own_field():
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_buckling_factors_have_gradients_with_the_own_field(at_rest):
+    """Check an aligned pair, of which many distances lie where near pairs of sources become far ones."""
     scene = flaps(force=(-0.02, 0, 0))
-    rest = ms.equilibrium(scene, remanent_magnetization=oblique(scene), load_factor=0.0, progress=False)
-    factor = torch.tensor(1.0, dtype=torch.float64, requires_grad=True)
-    found = ms.linear_buckling(scene, rest, load_factor=factor)
-    with pytest.raises(ms.NoGradient, match="no gradient of buckling factors with own_field"):
-        found.factors.sum().backward()
+
+    def factor(magnetization, load_factor):
+        about = None
+        if not at_rest:
+            about = ms.equilibrium(
+                scene,
+                remanent_magnetization=magnetization,
+                load_factor=0.0,
+                solver=ms.MixedNewton(tolerance=1e-13),
+                progress=False,
+            )
+        values = {"remanent_magnetization": magnetization} if at_rest else {}
+        return ms.linear_buckling(scene, about, load_factor=load_factor, **values).factors[0]
+
+    given = oblique(scene), np.array(1.0)
+    tensors = [torch.tensor(each, requires_grad=True) for each in given]
+    gradients = torch.autograd.grad(factor(*tensors), tensors)
+    for k, gradient in enumerate(gradients):
+        steepest = np.asarray(gradient)
+        along = steepest * np.abs(given[k]).max() / np.abs(steepest).max()
+        slopes = [
+            np.dot((1, -1), [float(factor(*moved(given, k, sign * step * along))) for sign in (1, -1)])
+            / (2 * step)
+            for step in (2e-3, 4e-3)
+        ]
+        assert (steepest * along).sum() == pytest.approx((4 * slopes[0] - slopes[1]) / 3, rel=1e-5)
+
+
+def moved(given, number, change):
+    """Return arrays of which one has changed."""
+    return [each + change if n == number else each for n, each in enumerate(given)]
 
 
 def test_a_response_with_the_own_field_is_the_slope_of_equilibria():

@@ -115,11 +115,11 @@ def linear_buckling(
     and bodies in contact, since a contact bears in one direction only, so that a mode and its opposite have different
     factors. ms.follow_path follows opening and closing contacts.
 
-    Factors are differentiable but for those of susceptible shells and with own_field, by perturbation of first order: by
-    values and load parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the
-    change of the equilibrium. A gradient costs two factorizations and some hundreds of evaluations of the stiffness for
-    each factor asked for. Factors that equal the next one to 1e-6 have none, nor those of loads with which supports move:
-    NoGradient says so.
+    Factors are differentiable but for those of susceptible shells, by perturbation of first order: by values and load
+    parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the change of the
+    equilibrium. A gradient costs two factorizations and some hundreds of evaluations of the stiffness for each factor asked
+    for; with own_field these take most of the time. Factors that equal the next one to 1e-6 have none, nor those of loads
+    with which supports move: NoGradient says so.
     Modes are arrays.
 
     Raises ValueError on bad input, about an equilibrium that is not stable or with its own load parameters; in a scene with
@@ -213,9 +213,6 @@ def _differentiable(
     refusal = ""
     if inputs.scene.has_susceptible_shells:
         refusal = "no gradient of buckling factors with a susceptibility"
-    if inputs.scene.own_field is not None:
-        # It has fourth derivatives of the energy, which jump where near pairs of sources become far ones.
-        refusal = "no gradient of buckling factors with own_field"
     moves = rate.any() and (further.any() or any(leaf.name == "support_factor" for leaf, _ in leaves))
     adjoint = BucklingAdjoint(
         here,
