@@ -28,6 +28,7 @@ SMALL = {
     "snapping_flaps": "step=0.5e-3",
     "self_folding": "",
     "bead_chain": "",
+    "hu_sheet": "(12, 4)",
     "tendon_arm": "",
     "pendulum_in_jelly": "cells=6",
     "bistable_beam": "cells=(24, 4), meshes=((12, 2), (24, 4), (48, 8))",

@@ -66,6 +66,15 @@ def bead_chain() -> dict[str, Any]:
     return shown(_eased(frames), parts, (14, -70), held=8, back=True)
 
 
+def hu_sheet() -> dict[str, Any]:
+    from hu_sheet import sheet_scene, states_of
+
+    scene = sheet_scene(own_field=True, cells=(12, 4))
+    states = [np.asarray(state.positions) for state in states_of(scene)]
+    parts = [(scene.mesh.faces, SHEET)]
+    return shown(_eased(states), parts, (14, -70), held=8, back=True)
+
+
 def _eased(states: list[np.ndarray]) -> list[np.ndarray]:
     """Return states with one half-way between each two, except across a snap."""
     found = []
@@ -85,4 +94,5 @@ SCENES = {
     "bead_chain": Scene(
         "Beads stiffen or soften the thread that carries them", bead_chain, film
     ),
+    "hu_sheet": Scene("A small robot bends to a C in a field", hu_sheet, film),
 }

@@ -1,1 +1,1 @@
-"""Parts of the examples snapping_flaps, self_folding and bead_chain."""
+"""Parts of the examples snapping_flaps, self_folding, bead_chain and hu_sheet."""
