@@ -32,8 +32,8 @@ demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pict
 test: $(VENV)/.with-test  ## every test, the notebooks and examples included
 	$(PYTEST)
 
-quick: $(VENV)/.with-test  ## the tests that take little time: some five minutes on two processors
-	$(PYTEST) -m "not slow"
+quick: $(VENV)/.with-test  ## the tests that take little time: under two minutes on two processors
+	$(PYTEST) -m "not slow" --durations=10 --durations-min=1
 
 seconds: $(VENV)/.with-test  ## measure again which tests take long, for `make quick`: every test
 	$(PYTEST) --junitxml=build/tests.xml

@@ -1,5 +1,5 @@
 """Writes the processor time of the slow tests from a report of pytest: one line for each test function, parameters
-together. The tests that are not listed take BUDGET seconds in sum.
+together and with the fixtures that it shares. The tests that are not listed take BUDGET seconds in sum.
 
 `make seconds` runs it:
 
@@ -9,42 +9,65 @@ together. The tests that are not listed take BUDGET seconds in sum.
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
-BUDGET = 60.0  # [s] of the processor for all quick tests together; pytest itself and imports come on top
+BUDGET = 120.0  # [s] of the processor for all quick tests together; collecting them and pytest itself take some 50 s more
 HEADER = """\
-# Tests that took longest, all parameters together: seconds of the processor, file::test. All others took {:.0f} s in sum.
+# Tests that took longest, all parameters together: seconds of the processor with the fixtures that they share, file::test.
+# All others took {:.0f} s in sum.
 # `make quick` leaves these out, and several processes begin with the files that take longest. Written by `make seconds`;
 # a test that is not here is quick.
 """
 
 
-def seconds_of(report: Path) -> dict[str, float]:
-    """Return test_file.py::test_name -> seconds, with fixtures, as tests/support/parallel.py names and measures them."""
-    seconds: dict[str, float] = defaultdict(float)
+class Test:
+    """The seconds of a test function: its own, all parameters together, and those of the fixtures that it shares."""
+
+    def __init__(self) -> None:
+        self.own = 0.0
+        self.shared: dict[str, float] = {}
+
+    @property
+    def seconds(self) -> float:
+        """Return the seconds that the test takes if it is the first to need its fixtures."""
+        return self.own + sum(self.shared.values())
+
+
+def seconds_of(report: Path) -> dict[str, Test]:
+    """Return test_file.py::test_name -> seconds, as tests/support/parallel.py names and measures them."""
+    tests: dict[str, Test] = defaultdict(Test)
     for case in ElementTree.parse(report).iter("testcase"):
         file = case.attrib["classname"].split(".")[-1]  # tests are functions, in no class
         name = re.sub(r"\[.*", "", case.attrib["name"], flags=re.DOTALL)
-        properties = case.iter("property")
-        seconds[f"{file}.py::{name}"] += sum(
-            float(each.attrib["value"]) for each in properties if each.attrib["name"] == "processor_seconds"
-        )
-    return seconds
+        test = tests[f"{file}.py::{name}"]
+        for each in case.iter("property"):
+            key, seconds = each.attrib["name"], float(each.attrib["value"])
+            if key == "processor_seconds":
+                test.own += seconds
+            elif key.startswith("shared "):
+                test.shared[key] = max(seconds, test.shared.get(key, 0.0))
+    return tests
 
 
-def slow_tests(seconds: dict[str, float], budget: float) -> list[str]:
-    """Return the names of the longest tests, in alphabetical order, without which the rest take at most `budget`."""
-    left, slow = sum(seconds.values()), []
-    for name in sorted(seconds, key=lambda name: (-seconds[name], name)):
+def slow_tests(tests: dict[str, Test], budget: float) -> list[str]:
+    """Return the names of the longest tests, in alphabetical order, without which the rest take at most `budget`.
+
+    A shared fixture counts once for all the rest that use it.
+    """
+    users = Counter(key for test in tests.values() for key in test.shared)
+    fixtures = {key: seconds for test in tests.values() for key, seconds in test.shared.items()}
+    left, slow = sum(test.own for test in tests.values()) + sum(fixtures.values()), []
+    for name in sorted(tests, key=lambda name: (-tests[name].seconds, name)):
         if left <= budget:
             break
         slow.append(name)
-        left -= seconds[name]
+        users.subtract(list(tests[name].shared))
+        left -= tests[name].own + sum(fixtures[key] for key in tests[name].shared if not users[key])
     return sorted(slow)
 
 
 if __name__ == "__main__":
     found = seconds_of(Path(sys.argv[1]))
-    lines = "".join(f"{found[name]:.2f} {name}\n" for name in slow_tests(found, BUDGET))
+    lines = "".join(f"{found[name].seconds:.2f} {name}\n" for name in slow_tests(found, BUDGET))
     Path(sys.argv[2]).write_text(HEADER.format(BUDGET) + lines)

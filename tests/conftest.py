@@ -24,6 +24,7 @@ import pytest  # noqa: E402
 from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
     pytest_collection_modifyitems,
     pytest_configure_node,
+    pytest_fixture_setup,
     pytest_runtest_protocol,
     pytest_runtest_setup,
     pytest_runtest_teardown,

@@ -73,6 +73,9 @@ def test_seconds_of_the_processor_count_all_parameters_and_fixtures(folder):
     @pytest.fixture(scope="module")
     def dear():
         spin(0.3)
+    @pytest.fixture(scope="module")
+    def needs_it(dear):
+        spin(0.1)
     def spin(seconds):
         end = time.process_time() + seconds
         while time.process_time() < end:
@@ -82,21 +85,37 @@ def test_seconds_of_the_processor_count_all_parameters_and_fixtures(folder):
         spin(0.2)
     def test_sleeps():
         time.sleep(0.8)
+    def test_comes_later(needs_it):
+        pass
     """
     (folder / "test_busy.py").write_text(textwrap.dedent(busy))
     run(folder, "--junitxml=report.xml")
     seconds = script().seconds_of(folder / "report.xml")
-    assert 0.85 < seconds["test_busy.py::test_spins"] < 3.0
-    assert seconds["test_busy.py::test_sleeps"] < 0.4  # the sleep takes no processor
+    spins, sleeps, later = (
+        seconds[f"test_busy.py::test_{name}"] for name in ("spins", "sleeps", "comes_later")
+    )
+    assert 0.55 < spins.own < 2.0 and 0.85 < spins.seconds < 3.0
+    assert sleeps.seconds < 0.4  # the sleep takes no processor
+    assert (
+        later.own < 0.2 and 0.35 < later.seconds < 1.5
+    )  # both fixtures, though another test built the first
+    assert [0.25 < value < 1.0 for name, value in later.shared.items() if name.endswith("::dear")] == [True]
 
 
 def test_longest_tests_are_slow_until_the_rest_fit_into_the_budget():
-    seconds = {"a": 3.0, "b": 40.0, "c": 2.0, "d": 30.0}
-    slow_tests = script().slow_tests
-    assert slow_tests(seconds, 75.0) == []
-    assert slow_tests(seconds, 35.0) == ["b"]
-    assert slow_tests(seconds, 34.0) == ["b", "d"]
-    assert slow_tests(seconds, 0.0) == ["a", "b", "c", "d"]
+    slow_tests, tests = script().slow_tests, {}
+    for name, own in {"a": 3.0, "b": 40.0, "c": 2.0, "d": 30.0}.items():
+        tests[name] = script().Test()
+        tests[name].own = own
+    assert slow_tests(tests, 75.0) == []
+    assert slow_tests(tests, 35.0) == ["b"]
+    assert slow_tests(tests, 34.0) == ["b", "d"]
+    assert slow_tests(tests, 0.0) == ["a", "b", "c", "d"]
+    tests["a"].shared = tests["c"].shared = {"shared fixture": 20.0}
+    assert slow_tests(tests, 95.0) == []  # it counts once
+    assert slow_tests(tests, 54.0) == ["b", "d"]  # a takes 23, and leaving it out alone saves 3
+    assert slow_tests(tests, 24.0) == ["a", "b", "d"]
+    assert slow_tests(tests, 5.0) == ["a", "b", "c", "d"]
 
 
 def test_tests_listed_with_their_seconds_are_slow_with_all_their_parameters(folder):

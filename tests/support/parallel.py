@@ -3,7 +3,8 @@ tests run while all others wait.
 
 A test that measures time, or counts threads, is marked `alone`. While it runs, the other processes wait between two tests.
 Tests that took long when they were last measured (tests/seconds.txt, written by `make seconds`) are marked `slow`;
-`make quick` leaves them out. They are measured in time of the processor, which depends little on what else it does.
+`make quick` leaves them out. They are measured in time of the processor, which depends little on what else it does. A
+fixture that the tests of a file share counts for each of them, as the first one that runs has to build it.
 """
 
 import contextlib
@@ -22,7 +23,10 @@ except ImportError:  # Windows
 
 MEMORY_A_PROCESS = 2.5e9  # bytes: the largest test, with torch and a picture in memory
 SECONDS = Path(__file__).parents[1] / "seconds.txt"
-BEGAN = pytest.StashKey[float]()
+BEGAN = pytest.StashKey[tuple]()
+SHARED = pytest.StashKey[
+    dict
+]()  # fixture of a file or of all tests -> seconds of the processor that it took to build
 PROCESSES = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 
 
@@ -102,20 +106,42 @@ def processor_time() -> float:
     return sum(os.times()[:4])
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(fixturedef, request: pytest.FixtureRequest) -> Iterator[object]:
+    """Record the seconds that a shared fixture takes, without those on which it depends: pytest builds them before."""
+    if fixturedef.scope == "function":
+        return (yield)
+    began = processor_time()
+    try:
+        return (yield)
+    finally:
+        taken = request.config.stash.setdefault(SHARED, {})
+        taken[fixturedef] = (
+            taken.get(fixturedef, 0.0) + processor_time() - began
+        )  # once for each of its parameters
+
+
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
     """Record the time at which the test's first fixture is built."""
-    item.stash[BEGAN] = processor_time()
+    item.stash[BEGAN] = processor_time(), dict(item.config.stash.get(SHARED, {}))
     return (yield)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
-    """Adds the seconds to pytest's report, where scripts/test_seconds.py reads it."""
+    """Add the seconds of the test and of each shared fixture to pytest's report, for scripts/test_seconds.py."""
     try:
         return (yield)
     finally:
-        item.user_properties.append(("processor_seconds", round(processor_time() - item.stash[BEGAN], 3)))
+        began, before = item.stash[BEGAN]
+        own, taken = processor_time() - began, item.config.stash.get(SHARED, {})
+        names = getattr(item, "_fixtureinfo", None)
+        shared = {chain[-1] for chain in names.name2fixturedefs.values()} & taken.keys() if names else set()
+        own -= sum(taken[each] - before.get(each, 0.0) for each in shared)
+        item.user_properties.append(("processor_seconds", round(own, 3)))
+        for each in shared:
+            item.user_properties.append((f"shared {each.baseid}::{each.argname}", round(taken[each], 3)))
 
 
 @pytest.hookimpl(wrapper=True)
