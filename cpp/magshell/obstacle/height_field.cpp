@@ -141,8 +141,8 @@ void HeightField::scan_block(const Block& block, const Vec3& point, double& leas
     }
 }
 
-// Finds the nearest point of the surface, evaluating each cell at one position only: below the point, or the
-// nearest to that. Returns `start` if that is nearer still.
+// Finds about the nearest point of the bilinear surface: each cell is evaluated at one place only, the one below the
+// point or nearest to that. Returns `start`, where the surface lies `gap` below the point, if that is nearer still.
 HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start, double gap) const {
     double least = (start - point.head<2>()).squaredNorm() + gap * gap;
     Pair best = start;
@@ -162,7 +162,8 @@ HeightField::Pair HeightField::scan(const Vec3& point, const Pair& start, double
 // Minimizes D by Newton's method; where its second derivatives are not positive definite, those of Gauss-Newton
 // are used.
 HeightField::Pair HeightField::nearest(const Vec3& point, Pair at) const {
-    const double close = 1e-8 * spacing_.minCoeff();  // the next step is far below round-off
+    const double close =
+        1e-8 * spacing_.minCoeff();  // convergence is quadratic: the next step would be below round-off
     Ground g = ground(at);
     const auto half_square = [&](const Pair& where, const Ground& there) {
         const double rise = there.height - point.z();

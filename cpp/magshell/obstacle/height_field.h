@@ -1,9 +1,10 @@
 // HeightField: an obstacle that fills the space below a surface z = h(x, y).
 //
 // h interpolates heights on a regular grid by bicubic splines. Beyond the border the last coefficients are
-// repeated, so that h stays twice continuously differentiable and becomes constant, along the axis that leaves
-// the grid, two cells beyond it. The distance is that to the nearest point p of the surface, where D = |x -
-// p|^2 / 2 is stationary.
+// repeated, so that h stays twice continuously differentiable and, two cells beyond the border, no longer changes
+// along the axis that leaves the grid. The distance is that to the nearest point p of the surface, where
+// D = |x - p|^2 / 2 is smallest: Newton's method finds it, from the point below x if D is convex there, otherwise
+// from the nearest point of the bilinear surface through the knots.
 #pragma once
 
 #include <array>
@@ -42,8 +43,9 @@ class HeightField final : public Obstacle {
     std::vector<double> coefficients_;
     double steepest_, sharpest_;  // bounds of |dh| [-] and of the eigenvalues of d2h [1/m]
 
-    // Data of the scan for the nearest point: heights of the knots, including those beyond the border until the
-    // surface is level, and blocks of cells with the range of their heights, by which blocks can be skipped.
+    // The bilinear surface on which a scan looks for the start of Newton's method: heights of the knots, including
+    // those beyond the border until the surface is level, and blocks of cells with the range of the heights of their
+    // knots, by which blocks can be skipped.
     struct Range {
         double low, high;
         double clamp(double x) const { return x < low ? low : x > high ? high : x; }
@@ -55,7 +57,7 @@ class HeightField final : public Obstacle {
     double knot(int axis, Index i) const;
     // Returns the range of a coordinate between two knots; infinite at the border.
     Range range(int axis, Index first, Index last) const;
-    // Returns a lower bound of the squared distance to a block.
+    // Returns a lower bound of the squared distance to a block of the bilinear surface.
     double squared_bound(const Block& block, const Vec3& point) const;
     void scan_block(const Block& block, const Vec3& point, double& least, Pair& best) const;
     Pair scan(const Vec3& point, const Pair& start, double gap) const;

@@ -6,7 +6,8 @@
 // x - p parallel to dphi(p).
 //
 // In the middle of the body, or far outside a concave part, there is no such point nearby; there the distance
-// is phi, and the normal that of phi's level set.
+// is phi, and the normal that of phi's level set. Outside the grid, which reaches four cells beyond the mesh, the
+// distance is that to the box around the mesh: never more than the true one.
 #pragma once
 
 #include <vector>
@@ -41,7 +42,7 @@ class MeshObstacle final : public Obstacle {
     std::array<Index, 3> samples_;
     std::vector<double> coefficients_;
     Vec3 middle_;
-    Box bounds_;  // box around the mesh: a bound of the distance outside the grid
+    Box bounds_;  // around the mesh, about `middle_`
 };
 
 }  // namespace magshell

@@ -7,7 +7,7 @@ namespace magshell {
 
 std::vector<double> grid_coefficients(std::span<const double> values, std::span<const Index> samples) {
     std::vector<double> from(values.begin(), values.end());
-    std::ptrdiff_t stride = 1;  // stride of the axis in `from`; later axes are longer already
+    std::ptrdiff_t stride = 1;  // of the axis in `from`; the axes after it have n + 2 entries already
     for (std::size_t axis = samples.size(); axis-- > 0;) {
         const Index n = samples[axis];
         const std::ptrdiff_t lines = static_cast<std::ptrdiff_t>(from.size()) / n;

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 class TetQuality(Frozen):
-    """The quality measures of a mesh's tetrahedra in the reference configuration, as arrays (n_t,); `print` shows extremes.
+    """The quality measures of a mesh's tetrahedra in the reference configuration, as arrays; `print` shows extremes.
 
-    All but `jacobian_ratios`, which measures how much ten nodes curve a tetrahedron, refer to the four corners. Small
-    dihedral angles make the stiffness matrix ill-conditioned, and angles near 180 degrees make strains inaccurate: angles
-    between 20 and 140 degrees are best. A regular tetrahedron has 70.5 degrees.
+    All refer to the four corners, but `volume_ratios` and `jacobian_ratios`, which take the curved edges of ten-node
+    tetrahedra into account. Small dihedral angles make the stiffness matrix ill-conditioned, and angles near 180 degrees
+    make strains inaccurate: angles between 20 and 140 degrees are best. A regular tetrahedron has 70.5 degrees.
 
     >>> import magshell as ms
     >>> ms.meshes.box((1.0, 1.0, 1.0), cells=(2, 2, 2)).quality
