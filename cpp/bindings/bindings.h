@@ -41,6 +41,7 @@ void register_water(py::module_& module);
 // Single kernels, which scenes evaluate by whole terms: bound for tests and benchmarks only, where MAGSHELL_TESTING is on.
 void register_contact_pairs(py::module_& module);
 void register_elimination_fronts(py::module_& module);
+void register_shape_friction(py::module_& module);
 void register_kernels(py::module_& module);
 
 }  // namespace magshell::bindings

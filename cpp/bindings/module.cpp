@@ -26,6 +26,7 @@ PYBIND11_MODULE(_core, module) {
 #ifdef MAGSHELL_TESTING
     b::register_contact_pairs(module);
     b::register_elimination_fronts(module);
+    b::register_shape_friction(module);
     b::register_kernels(module);
 #endif
 }

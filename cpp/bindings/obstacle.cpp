@@ -12,6 +12,7 @@
 #include "magshell/obstacle/mesh_obstacle.h"
 #include "magshell/obstacle/simple_shapes.h"
 #include "magshell/obstacle/tube.h"
+#include "magshell/terms/contact/nearest_point.h"
 
 namespace magshell::bindings {
 namespace {
@@ -65,6 +66,24 @@ Shared make_height_field(const std::array<double, 2>& origin, const std::array<d
         span_of(heights));
 }
 
+// The columns of `half` are those of H; a point has none.
+ShapeCore make_core(const Vec3& middle, const Eigen::MatrixXd& half, double radius, double crown) {
+    const int dimensions = static_cast<int>(half.cols());
+    if (half.rows() != 3 || (dimensions != 0 && dimensions != 1 && dimensions != 3))
+        throw InvalidInput("half must have shape (3, 0), (3, 1) or (3, 3)");
+    ShapeCore core{middle, Mat3::Zero(), dimensions, radius, crown};
+    core.half.leftCols(dimensions) = half;
+    return core;
+}
+
+py::tuple nearest_point(const Obstacle& obstacle, const ShapeCore& core, const Vec3& center,
+                        const Mat3& axes) {
+    const NearestPoint found(core, center + axes * core.middle, axes * core.half,
+                             [&](const Vec3& x) { return obstacle.distance(x); });
+    const Vec3 touch = found.point - core.radius * found.at.normal;
+    return py::make_tuple(found.at.value + found.rise - core.radius, found.at.normal, touch);
+}
+
 }  // namespace
 
 void register_obstacle(py::module_& module) {
@@ -103,6 +122,15 @@ void register_obstacle(py::module_& module) {
         .def(
             "inverted", [](const Shared& body) -> Shared { return std::make_shared<Complement>(body); },
             "The space around the body, as a body.");
+
+    py::class_<ShapeCore>(module, "ShapeCore", "The core of a smooth shape that a rigid body carries.")
+        .def(py::init(&make_core), py::arg("middle"), py::arg("half"), py::arg("radius"), py::arg("crown"));
+
+    module.def("nearest_point", &nearest_point, py::arg("obstacle"), py::arg("core"), py::arg("center"),
+               py::arg("axes"),
+               "The distance [m] of a shape from an obstacle, the normal (3,) and the point (3,) [m] of the "
+               "shape nearest to it, in the obstacle's own frame, where the shape's has this center (3,) [m] "
+               "and these axes (3, 3).");
 
     module.def("distances", &distances, py::arg("obstacle"), py::arg("points"),
                "At points (n, 3) [m] of the obstacle's own frame: signed distances (n,) [m], normals (n, 3) "

@@ -49,9 +49,8 @@ Vec3 to_vec3(const py::handle& given) {
 std::vector<RoundInput> rounds_of(const py::handle& given) {
     std::vector<RoundInput> rounds;
     for (const py::handle each : given)
-        rounds.push_back({each["shape"].cast<Index>(), each["obstacle"].cast<Index>(),
-                          to_vec3(each["middle"]), to_vec3(each["half"]), each["radius"].cast<double>(),
-                          each["crown"].cast<double>()});
+        rounds.push_back(
+            {each["shape"].cast<Index>(), each["obstacle"].cast<Index>(), each["core"].cast<ShapeCore>()});
     return rounds;
 }
 

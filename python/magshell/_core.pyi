@@ -40,6 +40,7 @@ __all__: list[str] = [
     "PythonField",
     "PythonGroupEnergy",
     "SampledField",
+    "ShapeCore",
     "SmallDeflection",
     "SolveStep",
     "StaticsOptions",
@@ -68,6 +69,7 @@ __all__: list[str] = [
     "lowest_modes",
     "moved",
     "nearest_neighbours",
+    "nearest_point",
     "num_threads",
     "pair_energies",
     "pair_energies_by_law",
@@ -83,6 +85,7 @@ __all__: list[str] = [
     "rasterized",
     "sample_fields",
     "set_num_threads",
+    "shape_friction",
     "shell_stresses",
     "simulate",
     "simulate_with_tangent",
@@ -328,6 +331,18 @@ class Obstacle:
         """
         The space around the body, as a body.
         """
+
+class ShapeCore:
+    """
+    The core of a smooth shape that a rigid body carries.
+    """
+    def __init__(
+        self,
+        middle: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+        half: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"],
+        radius: typing.SupportsFloat | typing.SupportsIndex,
+        crown: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> None: ...
 
 class AttackCurve:
     @typing.overload
@@ -1291,6 +1306,16 @@ def nearest_neighbours(model: Model, contact: typing.SupportsInt | typing.Suppor
     Of a contact of bodies, by its number, the neighbours along a surface that are nearest each other at rest, if that is nearer than twice its reach and minimal distance: how far [m], and their faces in words.
     """
 
+def nearest_point(
+    obstacle: Obstacle,
+    core: ShapeCore,
+    center: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    axes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"],
+) -> tuple[typing.Any, ...]:
+    """
+    The distance [m] of a shape from an obstacle, the normal (3,) and the point (3,) [m] of the shape nearest to it, in the obstacle's own frame, where the shape's has this center (3,) [m] and these axes (3, 3).
+    """
+
 def num_threads() -> int: ...
 def pair_energies(
     kind: str,
@@ -1454,6 +1479,21 @@ def sample_fields(
     """
 
 def set_num_threads(count: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+def shape_friction(
+    core: ShapeCore,
+    center: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    obstacle: Obstacle,
+    obstacle_center: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    smoothing: typing.SupportsFloat | typing.SupportsIndex,
+    sticking_speed: typing.SupportsFloat | typing.SupportsIndex,
+    rest: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> dict[str, typing.Any]:
+    """
+    The gap [m] between a shape and an obstacle, and the friction's forces (8, 3) [N] on the corners of both rigid bodies, with their derivatives by positions at constant velocities (8, 8, 3, 3), for a contact stiffness and a coefficient of friction of 1.
+    """
+
 def shell_stresses(
     model: Model,
     sheet: typing.SupportsInt | typing.SupportsIndex,

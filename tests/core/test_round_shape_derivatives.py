@@ -1,10 +1,11 @@
-"""Derivatives of the energy of smooth balls and capsules in contact, in rigid motions, against differences."""
+"""Derivatives of contact and friction of smooth shapes, in rigid motions, against differences."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import magshell as ms
+from magshell import _core
 from magshell import obstacles as ob
 
 R = 5e-3  # m, radius of all shapes
@@ -15,6 +16,8 @@ OBSTACLES = {
     "sphere": ob.Sphere(R, center=CENTER),
     "capsule": ob.Capsule(R, 3 * R, center=CENTER, rotation=(0.3, 1.2, -0.2)),
     "ellipsoid": ob.Ellipsoid((R, 1.4 * R, 0.8 * R), center=CENTER, rotation=(0.2, -0.1, 0.3)),
+    "plane": ob.Plane(center=CENTER, rotation=(0.1, -0.2, 0.0)),
+    "box": ob.Box((4 * R, 3 * R, 2 * R), rounding=0.5 * R, center=CENTER, rotation=(0.3, 0.5, 0.1)),
 }
 
 
@@ -31,6 +34,8 @@ def overlapping(shape: str, obstacle: str):
         moving = {
             "ball": ob.Sphere(R, center=at),
             "capsule": ob.Capsule(R, 2 * R, center=at, rotation=(0.4, 1.3, 0.2)),
+            "ellipsoid": ob.Ellipsoid((1.5 * R, 0.7 * R, R), center=at, rotation=(0.4, 1.3, 0.2)),
+            "block": ob.Box((2 * R, 3 * R, R), rounding=0.2 * R, center=at, rotation=(0.4, 0.3, 0.2)),
         }
         touch = ms.Contact(
             ob.Attached(OBSTACLES[obstacle], to=carrier),
@@ -40,8 +45,8 @@ def overlapping(shape: str, obstacle: str):
         return ms.Scene([mover, carrier], contacts=[touch], allow_rigid_motions=True)
 
     # Moves the shape down until the energy of contact is that of DEPTH.
-    for lower in np.arange(0.0, 2 * R, 0.25 * DEPTH):
-        scene = built(above + np.array([0, 0, 0.6 * R - lower]))
+    for lower in np.arange(0.0, 4 * R, 0.25 * DEPTH):
+        scene = built(above + np.array([0, 0, 1.6 * R - lower]))
         model = scene._model
         state, load = model.rest_state(), scene._load_parameter_layout.zeros()
         if model.energy(state, load) > 0.5 * 2e3 * DEPTH**2:
@@ -84,8 +89,14 @@ def turning_forces(state: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     return out.reshape(12, 12)
 
 
-@pytest.mark.parametrize("obstacle", OBSTACLES)
-@pytest.mark.parametrize("shape", ["ball", "capsule"])
+# A capsule on a plane, or a block, touches with several ends or corners; a block touches planes only.
+PAIRS = [
+    *((shape, obstacle) for shape in ("ball", "capsule", "ellipsoid") for obstacle in OBSTACLES),
+    ("block", "plane"),
+]
+
+
+@pytest.mark.parametrize(("shape", "obstacle"), PAIRS)
 def test_gradient_and_hessian_in_rigid_motions_match_differences(shape, obstacle):
     model, state, load = overlapping(shape, obstacle)
     scale = np.tile([1.0, 1.0, 1.0, R, R, R], 2)  # turns count by the displacement at the surface
@@ -116,3 +127,59 @@ def test_gradient_and_hessian_in_rigid_motions_match_differences(shape, obstacle
     exact = basis @ np.transpose(products) + turning_forces(state, model.gradient(state, load))
     exact /= np.outer(scale, scale)
     np.testing.assert_allclose(exact, second, atol=1e-6 * np.abs(second).max())
+
+
+CORES = {
+    "ball": ((1e-3, 0, 0), np.zeros((3, 0)), R),
+    "capsule": ((0, 1e-3, 0), np.array([[1.0], [0.3], [0.2]]) * 2 * R, R),
+    "ellipsoid": ((0, 0, 1e-3), np.diag([1.5, 0.7, 1.1]) * R, 0.0),
+}
+
+
+@pytest.mark.parametrize("obstacle", OBSTACLES)
+@pytest.mark.parametrize("shape", CORES)
+@pytest.mark.parametrize("slides", [True, False])
+def test_friction_by_positions_matches_differences(shape, obstacle, slides):
+    """Differentiate the forces of friction at constant velocities, within and beyond the sticking speed."""
+    middle, half, radius = CORES[shape]
+    core = _core.ShapeCore(middle, Rotation.from_rotvec((0.3, 0.4, -0.2)).as_matrix() @ half, radius, 0.0)
+    rng = np.random.default_rng(5)
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    rest = np.concatenate([3e-3 * corners, 4e-3 * corners])
+    velocities = 0.1 * rng.standard_normal((8, 3))
+    law = {"smoothing": 0.3 * DEPTH, "sticking_speed": 1e-3 if slides else 1.0}
+
+    def found(state, height):
+        return _core.shape_friction(
+            core,
+            (4e-4, -3e-4, height),
+            OBSTACLES[obstacle]._core,
+            np.zeros(3),
+            rest=rest,
+            positions=state.reshape(8, 3),
+            velocities=velocities,
+            **law,
+        )
+
+    state = moved(rest.ravel(), np.array([[0, 0, 0, 0.1, 0.3, -0.2], [0, 0, 0, -0.2, 0.1, 0.3]]))
+    low, high = 0.0, 6 * R  # where the shape overlaps the obstacle by DEPTH
+    for _ in range(60):
+        height = 0.5 * (low + high)
+        low, high = (height, high) if found(state, height)["gap"] < -DEPTH else (low, height)
+    at = found(state, high)
+    assert at["gap"] == pytest.approx(-DEPTH, rel=1e-6)
+    blocks = at["by_positions"].transpose(0, 2, 1, 3).reshape(24, 24)
+    size = np.abs(blocks).max() * 4e-3
+    assert np.abs(at["forces"]).max() > 0.0
+    assert np.abs(at["forces"].sum(axis=0)).max() < 1e-12 * np.abs(at["forces"]).max()
+    step = 1e-5
+    for motion in np.eye(12):
+        motion[[0, 1, 2, 6, 7, 8]] *= R
+        ahead, behind = (
+            found(moved(state, sign * step * motion.reshape(2, 6)), high)["forces"].ravel()
+            for sign in (1, -1)
+        )
+        along = (moved(state, step * motion.reshape(2, 6)) - moved(state, -step * motion.reshape(2, 6))) / (
+            2 * step
+        )
+        np.testing.assert_allclose(blocks @ along, (ahead - behind) / (2 * step), atol=1e-6 * size)

@@ -93,6 +93,9 @@ ATTACHED_MAKERS = {
     "onto attached obstacles, rubbing, contact implicit": lambda: thrown_onto_attached(
         ms.TRBDF2(implicit_contact=True), **RUBS, face_samples=1
     ),
+    "onto attached obstacles, rubbing late": lambda: thrown_onto_attached(
+        ms.TRBDF2(), **RUBS, lagged_friction=True
+    ),
     "at rest on an attached obstacle": resting_on_attached,
     "onto an Ellipsoid that moves": thrown_onto_a_moving_ellipsoid,
 }

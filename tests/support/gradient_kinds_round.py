@@ -1,4 +1,4 @@
-"""Kinds of scene for test_every_gradient.py in which smooth rigid balls and capsules touch."""
+"""Kinds of scene for test_every_gradient.py in which smooth shapes of rigid bodies touch."""
 
 import numpy as np
 from gradient_kinds_attached import LAW, PLACE, RUBS
@@ -84,6 +84,34 @@ def pressing() -> Kind:
     return Kind(scene, {"gravity_factor": 0.9}, fixed=EXACT, step=5e-5, reach={**REACH, **PLACE})
 
 
+def tumbling(integrator, in_time=0, **contact) -> Kind:
+    """Build two spinning ellipsoids that fall on each other, on a capsule on an arm, and on a plane."""
+    skeleton, rod = _arm()
+    eggs = []
+    for center, turn, velocity in (
+        ((0.045, 0.006, 0.0213), (0.3, 0.2, 0.1), (0.05, -0.02, -0.3)),
+        ((0.0053, 0.008, 0.0212), (0.1, -0.4, 0.6), (0.1, 0.05, -0.2)),
+    ):
+        body = ms.RigidBody(
+            mass=5e-3,
+            inertia=(8e-7, 9e-7, 1e-6),
+            center=center,
+            velocity=velocity,
+            angular_velocity=(2.0, 3.0, -1.0),
+        )
+        place = {"center": np.add(center, (1e-3, -5e-4, 2e-3)), "rotation": turn}
+        eggs.append((body, ob.Attached(ob.Ellipsoid((0.021, 0.015, 0.012)), to=body, **place)))
+    (one, first), (other, second) = eggs
+    floor = ob.Plane(center=(0.0, 0.0, 9.2e-3), rotation=(0.02, 0.03, 0.0))
+    touch = ms.Contact([rod, floor, second], shapes=[first, second], **{**LAW, "smoothing": 2e-4, **contact})
+    scene = ms.Scene(
+        [one, other, skeleton], contacts=[touch], gravity=(0, 0.3, -9.81), allow_rigid_motions=True
+    )
+    inputs = {"time_step": 2e-3, "gravity_factor": 0.9}
+    fixed = {**EXACT, "steps": 6, "integrator": integrator, "progress": False}
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach={**REACH, **PLACE}, in_time=in_time)
+
+
 ROUND_MAKERS = {
     "balls that touch": lambda: thrown(ms.ImplicitEuler()),
     "balls that touch, rubbing, tr_bdf2": lambda: thrown(ms.TRBDF2(), **RUBS),
@@ -91,4 +119,9 @@ ROUND_MAKERS = {
     "balls that touch a moving obstacle": lambda: thrown(ms.ImplicitEuler(), in_time=6, **RUBS),
     "capsules that cross, rubbing": lambda: crossing(ms.TRBDF2(), **RUBS),
     "capsules at rest on each other": pressing,
+    "balls that touch, rubbing late": lambda: thrown(ms.TRBDF2(), lagged_friction=True, **RUBS),
+    "ellipsoids that touch, rubbing": lambda: tumbling(ms.TRBDF2(), **RUBS),
+    "ellipsoids that touch, rubbing late, contact implicit": lambda: tumbling(
+        ms.TRBDF2(implicit_contact=True), in_time=6, lagged_friction=True, **RUBS
+    ),
 }

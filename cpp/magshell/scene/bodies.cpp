@@ -178,7 +178,7 @@ std::vector<std::array<Index, 4>> Bodies::corners_of(const std::vector<Index>& r
     return all;
 }
 
-// Couples every point in contact with the corners of the rigid body that carries the obstacle, and every ball and capsule with its own and
+// Couples every point in contact with the corners of the rigid body that carries the obstacle, and every smooth shape with its own and
 // with these.
 void Bodies::add_attached_couplings(const SceneInput& input) {
     const std::vector<std::array<Index, 4>> corners = corners_of(input.attached_to);

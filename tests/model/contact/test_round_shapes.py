@@ -234,12 +234,11 @@ def test_misuse_of_shapes_is_refused():
     body, ball = ball_at((0, 0, 0.1))
     _, rod = rod_at((0, 0, 0.1), (0, 0, 0))
     cases = [
-        ({"shapes": ob.Sphere(R)}, "shapes must be solid spheres and capsules"),
-        ({"shapes": ob.Attached(ob.Ellipsoid((R, R, 2 * R)), to=body)}, "shapes must be solid spheres"),
+        ({"shapes": ob.Sphere(R)}, "shapes must be solid spheres, capsules, ellipsoids and boxes"),
+        ({"shapes": ob.Attached(ob.Plane(), to=body)}, "shapes must be solid spheres"),
         ({"shapes": ob.Attached(ob.Sphere(R, inside=True), to=body)}, "shapes must be solid spheres"),
         ({"shapes": ball, "vertices": [0]}, "give vertices to another Contact"),
         ({"shapes": ball, "face_samples": 1}, "give face_samples to another Contact"),
-        ({"shapes": ball, "lagged_friction": True}, "lagged_friction is not available with shapes"),
     ]
     for options, words in cases:
         with pytest.raises(ValueError, match=words):

@@ -193,3 +193,58 @@ def test_gradients_of_a_fast_top_agree_with_differences(method):
         step = 1e-4 if name != "time_step" else 1e-6
         difference = (8 * (along(step) - along(-step)) - along(2 * step) + along(-2 * step)) / (12 * step)
         assert (gradient * direction).sum() == pytest.approx(difference, rel=1e-6, abs=1e-7), name
+
+
+def inverse_left_jacobian(r):
+    """Return dr/dt for an angular velocity: the rate of a rotation vector is J^-1 w in world axes."""
+    angle = np.linalg.norm(r)
+    cross = np.cross(np.eye(3), r)  # cross @ x = r x x
+    if angle < 1e-6:
+        return np.eye(3) - 0.5 * cross
+    factor = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
+    return np.eye(3) - 0.5 * cross + factor * cross @ cross
+
+
+def test_free_linkage_follows_forward_dynamics_at_second_order():
+    """Integrate ms.forward_dynamics to 1e-11 beside the motion: errors are of second order, for want of a known flight."""
+    spin = {"velocity": (0.1, 0.2, -0.3), "angular_velocity": (1.0, 2.0, 0.5)}
+    base = ms.Link(mass=2.0, inertia=(0.1, 0.2, 0.25), center=(0, 0, 0), **spin)
+    hand = ms.Link(mass=0.7, inertia=(0.02, 0.03, 0.04), center=(0.5, 0.1, 0.0))
+    hinge = ms.Revolute(child=hand, parent=base, origin=(0.3, 0, 0), axis=(0, 0.3, 1), rate=3.0)
+    skeleton = ms.Skeleton([base, hand], [hinge])
+    slices = ms.coordinate_slices(skeleton)
+    joint, root = slices[hinge], slices[base].start
+    start = np.zeros(14)
+    start[7:][joint] = 3.0
+    start[7 + root : 7 + root + 6] = (0.1, 0.2, -0.3, 1.0, 2.0, 0.5)
+
+    def rates(_, state):
+        at, speed = state[:7], state[7:]
+        along = speed.copy()
+        turned = slice(root + 3, root + 6)
+        along[turned] = inverse_left_jacobian(at[turned]) @ speed[turned]
+        return np.concatenate([along, ms.forward_dynamics(skeleton, at, speed, np.zeros(7))])
+
+    end = solve_ivp(rates, (0, 1.0), start, "DOP853", rtol=1e-11, atol=1e-12).y[:7, -1]
+    scene = ms.Scene(skeleton, allow_rigid_motions=True)
+    errors = []
+    for time_step in (0.02, 0.01):
+        move = ms.simulate(
+            scene, steps=round(1 / time_step), time_step=time_step, integrator=ms.TRBDF2(), progress=False
+        )
+        moved_by = move[base].center[-1] - move[base].center[0]
+        errors.append(
+            max(np.abs(moved_by - end[root : root + 3]).max(), abs(move[hinge].angle[-1] - end[joint][0]))
+        )
+    assert errors[1] < 4e-3  # rad of 3, and m
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_link_without_a_joint_flies_as_a_free_body():
+    spin = (0.4, 2.0, 0.6)
+    link = ms.Link(mass=1.0, inertia=INERTIA, center=(0, 0, 0), angular_velocity=spin)
+    scene = ms.Scene(ms.Skeleton([link], []), allow_rigid_motions=True)
+    motion = ms.simulate(scene, steps=50, time_step=0.04, progress=False)
+    rates = motion[link].rotation[-1].T @ motion[link].angular_velocity[-1]
+    assert rates == pytest.approx(euler_rates(spin, 2.0).sol(2.0), abs=1e-5)
+    assert motion.kinetic_energy == pytest.approx(motion.kinetic_energy[0], rel=1e-9)

@@ -22,11 +22,6 @@ Vec3 weighted(const ContactPoint& point, const double* all) {
     return sum;
 }
 
-// The number of parts of an axis between points that are at most a radius apart.
-int axis_parts(const RoundInput& round) {
-    return static_cast<int>(std::ceil(2.0 * round.half.norm() / round.radius));
-}
-
 ContactTerm::AttachedNodes all_nodes(const ContactPoint& point, const CornerFrame& frame) {
     ContactTerm::AttachedNodes nodes;
     std::ranges::copy(frame.corners(), std::ranges::copy(point.nodes, nodes.begin()).out);
@@ -63,9 +58,11 @@ ContactTerm::ContactTerm(const Nodes& nodes, const SystemMatrix& matrix,
         contact.obstacles = given.obstacles;
         contact.points = given.points;
         contact.rounds = given.rounds;
-        for (const RoundInput& round : contact.rounds)
+        for (const RoundInput& round : contact.rounds) {
+            contact.inner.push_back(inner_balls(round.core));
             contact.round_slots.push_back(pair_slots<RoundMotion::places>(
                 matrix, RoundMotion::nodes(*frames_[round.shape], frames_[round.obstacle].get())));
+        }
         for (ContactPoint& point : contact.points) {
             for (Index& node : point.nodes)
                 if (node >= 0) node = nodes.vertices.core[node];
@@ -218,8 +215,8 @@ std::shared_ptr<const ContactTerm::ActiveContact> ContactTerm::on_surface(const 
 
 void ContactTerm::add_round_vjp(const ActiveContact& active, const RoundMotion& motion,
                                 const RoundMotion::Slopes& slopes, const ContactLaw& by_friction,
-                                const LoadParameters& load_parameters, Gradient& out) const {
-    const ObstacleState obstacle = obstacle_state(active.obstacle, load_parameters);
+                                const ObstacleState& obstacle, VectorXd& by_values,
+                                LoadParameters& by_load_parameters) const {
     const Contact& contact = contacts_[active.contact];
     const Index shape = contact.rounds[active.point - contact.points.size()].shape;
     Placement by_shape;
@@ -230,9 +227,9 @@ void ContactTerm::add_round_vjp(const ActiveContact& active, const RoundMotion& 
     if (!active.relative)
         obstacle.vjp(motion.point(), {0.0, Vec3::Zero(), Mat3::Zero()}, 0.0, Vec3::Zero(), slopes.by_velocity,
                      by_obstacle);
-    add_vjp(active, slopes.by_force, by_friction, by_obstacle, out.values, out.load_parameters);
-    out.values.segment<3>(obstacle_slices_[shape].center.first) += by_shape.center;
-    out.values.segment<3>(obstacle_slices_[shape].rotation.first) += by_shape.rotation_vector;
+    add_vjp(active, slopes.by_force, by_friction, by_obstacle, by_values, by_load_parameters);
+    by_values.segment<3>(obstacle_slices_[shape].center.first) += by_shape.center;
+    by_values.segment<3>(obstacle_slices_[shape].rotation.first) += by_shape.rotation_vector;
 }
 
 std::string Passage::describe(const Nodes& all) const {
@@ -257,19 +254,18 @@ Passage ContactTerm::passes_through(const VectorXd& q, const LoadParameters& loa
     return passes_between(own_positions(q, load_parameters), own_positions(end, load_parameters_at_end));
 }
 
-std::vector<Vec3> ContactTerm::axis_points(const RoundInput& round, const double* q) const {
+std::vector<Vec3> ContactTerm::inner_centers(const RoundInput& round, const std::vector<InnerBall>& balls,
+                                             const double* q) const {
     const Placement& placed = obstacles_[round.shape].placement;
     const CornerFrame& frame = *frames_[round.shape];
     const CornerFrame::Pose pose = frame.pose(q);
     const Mat3 turned = rotation(placed.rotation_vector);
-    const auto at = [&](double t) -> Vec3 {
-        const Vec3 rest = placed.center + turned * (round.middle + t * round.half);
-        return pose.center + pose.axes * (rest - frame.rest_center());
-    };
-    const int parts = axis_parts(round);
-    std::vector<Vec3> points;
-    for (int k = 0; k <= parts; ++k) points.push_back(at(parts == 0 ? 0.0 : 2.0 * k / parts - 1.0));
-    return points;
+    std::vector<Vec3> centers;
+    for (const InnerBall& ball : balls) {
+        const Vec3 rest = placed.center + turned * ball.center;
+        centers.push_back(pose.center + pose.axes * (rest - frame.rest_center()));
+    }
+    return centers;
 }
 
 Vec3 ContactTerm::own_position(Index obstacle, const ObstacleState& at, const VectorXd& q,
@@ -287,9 +283,10 @@ std::vector<Vec3> ContactTerm::own_positions(const VectorXd& q, const LoadParame
                 places.push_back(own_position(o, obstacle, q, weighted(point, q.data())));
         }
     for (const Contact& contact : contacts_)
-        for (const RoundInput& round : contact.rounds) {
+        for (std::size_t k = 0; k < contact.rounds.size(); ++k) {
+            const RoundInput& round = contact.rounds[k];
             const ObstacleState obstacle = obstacle_state(round.obstacle, load_parameters);
-            for (const Vec3& x : axis_points(round, q.data()))
+            for (const Vec3& x : inner_centers(round, contact.inner[k], q.data()))
                 places.push_back(own_position(round.obstacle, obstacle, q, x));
         }
     for (const WatchedObstacle& each : watched_) {
@@ -311,11 +308,15 @@ Passage ContactTerm::passes_between(const std::vector<Vec3>& before, const std::
                 ++k;
             }
     for (const Contact& contact : contacts_)
-        for (const RoundInput& round : contact.rounds)
-            for (int parts = axis_parts(round); parts >= 0; --parts, ++k)
+        for (std::size_t r = 0; r < contact.rounds.size(); ++r) {
+            const RoundInput& round = contact.rounds[r];
+            for (const InnerBall& ball : contact.inner[r]) {
                 if (magshell::passes_through(*obstacles_[round.obstacle].shape, before[k], after[k],
-                                             round.radius))
+                                             ball.radius))
                     return {{frames_[round.shape]->corners()[0], -1, -1}, true};
+                ++k;
+            }
+        }
     for (const WatchedObstacle& each : watched_)
         for (const std::array<Index, 3>& face : each.faces) {
             const std::array<Vec3, 3> from{before[k], before[k + 1], before[k + 2]},
@@ -482,7 +483,7 @@ std::vector<ContactTerm::HardContact> ContactTerm::hard_contacts() const {
     std::vector<HardContact> all;
     for (std::size_t c = 0; c < contacts_.size(); ++c) {
         if (!contacts_[c].rounds.empty())
-            throw InvalidInput("Coulomb's law node by node is for vertices, not for balls and capsules");
+            throw InvalidInput("Coulomb's law node by node is for vertices, not for shapes of rigid bodies");
         for (const Index obstacle : contacts_[c].obstacles)
             for (const ContactPoint& p : contacts_[c].points) {
                 if (frames_[obstacle])
@@ -543,7 +544,8 @@ void ContactTerm::vjp(const double*, const LoadParameters& load_parameters, cons
                                              .by_normal = -active.force * along,
                                              .by_motion = -active.force * active.at.normal,
                                              .lambda = lambda};
-            add_round_vjp(active, *active.round, slopes, {}, load_parameters, out);
+            add_round_vjp(active, *active.round, slopes, {}, obstacle_state(active.obstacle, load_parameters),
+                          out.values, out.load_parameters);
             continue;
         }
         ObstacleGradient by_obstacle;

@@ -1,5 +1,5 @@
 // ContactTerm: contact of bodies with obstacles by penalty energies at points: the vertices and, optionally,
-// sample points on faces. Balls and capsules that rigid bodies carry touch obstacles by their axes (round_motion.h).
+// sample points on faces. Smooth shapes that rigid bodies carry touch obstacles as a whole (round_motion.h).
 #pragma once
 
 #include <memory>
@@ -20,8 +20,8 @@ struct ContactPoint {
     Vec3 weights = Vec3::UnitX();
 };
 
-/// One contact: the obstacles and the points that they act on. Points on faces come after vertices. Or balls and capsules, each with the
-/// obstacle that it may touch.
+/// One contact: the obstacles and the points that they act on. Points on faces come after vertices. Or shapes, each with the obstacle
+/// that it may touch.
 struct ContactInput {
     std::vector<Index> obstacles;
     std::vector<ContactPoint> points;  // in the caller's numbering of vertices
@@ -38,8 +38,8 @@ struct WatchedObstacle {
     std::vector<std::array<Index, 3>> faces;  // in the caller's numbering of vertices
 };
 
-/// A passage through an obstacle: of a point, the first of whose nodes is given, of a face, or of a ball or capsule, a node of whose
-/// rigid body is given.
+/// A passage through an obstacle: of a point, the first of whose nodes is given, of a face, or of a shape, a node of whose rigid body is
+/// given.
 struct Passage {
     std::array<Index, 3> nodes{-1, -1, -1};
     bool is_round = false;
@@ -56,13 +56,13 @@ class ContactTerm final : public Term {
     /// A point in contact with an obstacle.
     struct ActiveContact {
         Index contact, obstacle,
-            point;  // point: of the contact's points, or, beyond them, of its balls and capsules
+            point;  // point: of the contact's points, or, beyond them, of its shapes
         Vec3 position;
         Distance at;
         double force, stiffness;                                   // N [N] and dN/d(depth) [N/m]
         double by_smoothing;                                       // dN/d(smoothing) [N/m]
         std::shared_ptr<const RelativeMotion> relative = nullptr;  // of an obstacle that a rigid body carries
-        std::shared_ptr<const RoundMotion> round = nullptr;        // of a ball or a capsule; `at` has its gap
+        std::shared_ptr<const RoundMotion> round = nullptr;        // of a shape; `at` has its gap
     };
     /// The places of a point in contact with an attached obstacle: the nodes of the point, then the corners of the rigid body.
     static constexpr int point_nodes = 3, attached_nodes = 7;
@@ -116,7 +116,7 @@ class ContactTerm final : public Term {
     /// Returns the rotation vectors of each obstacle, by its placement and by its pose [rad].
     std::vector<Vec3> rotation_vectors(const LoadParameters& load_parameters) const;
 
-    /// Returns the point of a contact that is not of a ball or a capsule.
+    /// Returns the point of a contact that is not of a shape.
     const ContactPoint& point(const ActiveContact& active) const {
         return contacts_[active.contact].points[active.point];
     }
@@ -133,11 +133,12 @@ class ContactTerm final : public Term {
                  const ObstacleGradient& by_obstacle, VectorXd& by_values,
                  LoadParameters& by_load_parameters) const;
 
-    /// Adds the gradient of a function of the contact of a ball or a capsule, as add_vjp() does.
+    /// Adds the gradient of a function of the contact of a shape, as add_vjp() does.
     void add_round_vjp(const ActiveContact& active, const RoundMotion& motion,
                        const RoundMotion::Slopes& slopes, const ContactLaw& by_friction,
-                       const LoadParameters& load_parameters, Gradient& out) const;
-    /// Returns the contact of a ball or a capsule with all motions and forces on its surface, where friction acts.
+                       const ObstacleState& obstacle, VectorXd& by_values,
+                       LoadParameters& by_load_parameters) const;
+    /// Returns the contact of a shape with all motions and forces on its surface, where friction acts.
     static std::shared_ptr<const ActiveContact> on_surface(const ActiveContact& active);
 
     /// Adds a symmetric block between the nodes of a point, weighted by their shape functions, and those of a rigid body that carries
@@ -169,14 +170,15 @@ class ContactTerm final : public Term {
     std::size_t bytes() const override;
 
   private:
-    /// Appends the balls and capsules of a contact that are in contact.
+    /// Appends the shapes of a contact that are in contact.
     void add_active_rounds(Index contact, const double* q, const LoadParameters& load_parameters,
                            std::vector<ActiveContact>& out) const;
-    /// Adds the symmetric blocks block(i, j) between the rigid bodies of a ball or a capsule and of its obstacle.
+    /// Adds the symmetric blocks block(i, j) between the rigid bodies of a shape and of its obstacle.
     template <class Block>
     void add_round_blocks(const ActiveContact& active, const Block& block, SystemMatrix& out) const;
-    /// Returns points on the axis of a ball or a capsule, so near to each other that no obstacle slips between them [m].
-    std::vector<Vec3> axis_points(const RoundInput& round, const double* q) const;
+    /// Returns the centers of the balls within a shape of a contact [m].
+    std::vector<Vec3> inner_centers(const RoundInput& round, const std::vector<InnerBall>& balls,
+                                    const double* q) const;
     /// Returns a point of the world in an obstacle's own frame.
     Vec3 own_position(Index obstacle, const ObstacleState& at, const VectorXd& q, const Vec3& x) const;
     /// Calls add(node, part) for the parts of a vector at a point that its nodes take, and those of the reaction.
@@ -192,6 +194,7 @@ class ContactTerm final : public Term {
         std::vector<Index> obstacles;
         std::vector<ContactPoint> points;  // in the core's numbering of nodes
         std::vector<RoundInput> rounds;
+        std::vector<std::vector<InnerBall>> inner;  // of each of them
         std::vector<PairSlots<RoundMotion::places>> round_slots;
         std::vector<PairSlots<3>> slots;  // for points on faces, which come last
         Index first_on_face = 0;

@@ -52,14 +52,15 @@ void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool po
         contact_.add_block(each.point(), -coefficient * at.rate * by_velocity, out);
         if (each.lagged || contacts_.frozen()) continue;
         if (each.surface) {
-            each.surface->round->add_friction(each.friction, active.stiffness, each.obstacle.spin(),
-                                              -coefficient, at.v, rest);
+            const RoundMotion& round = *each.surface->round;
+            round.add(round.by_positions(each.friction, active.stiffness, each.obstacle.spin(), at.v),
+                      -coefficient, rest);
             continue;
         }
         const Mat3 block = -coefficient * by_position(each.friction, active, each.obstacle.spin());
         const ContactPoint& point = contact_.point(active);
         if (active.relative) {
-            add_attached(each, -coefficient, at.v, rest);
+            add_attached(each, attached_blocks(each, at.v), -coefficient, rest);
             continue;
         }
         if (point.nodes[1] < 0) {
@@ -77,8 +78,8 @@ void FrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool po
 //   dN = - k n . G dx,   dn = C G dx + dR R^T n,   dR w_k = sum_j (w_j . w_k) dx_j,   dG_k = (dR w_k) d^T + (R w_k) dd^T
 //
 // with d = x - c, C the curvature and k the stiffness; relative_motion.h has G.
-void FrictionTerm::add_attached(const FrictionContact& each, double factor, const VectorXd& v,
-                                NonsymmetricTangent& rest) const {
+FrictionTerm::AttachedBlocks FrictionTerm::attached_blocks(const FrictionContact& each,
+                                                           const VectorXd& v) const {
     constexpr int points = ContactTerm::point_nodes, all = ContactTerm::attached_nodes;
     const ContactTerm::ActiveContact& active = *each.active;
     const RelativeMotion& relative = *active.relative;
@@ -104,16 +105,23 @@ void FrictionTerm::add_attached(const FrictionContact& each, double factor, cons
         changes[j] += relative.levers[corner].dot(active.at.normal) * friction.by_normal +
                       turned * friction.by_velocity;
     }
-    const auto block = [&](int i, int j) -> Mat3 {
-        Mat3 sum = jacobians[i].transpose() * changes[j];
-        if (i >= points) {
+    AttachedBlocks blocks(all * all);
+    for (int i = 0; i < all; ++i)
+        for (int j = 0; j < all; ++j) {
+            Mat3& sum = blocks[all * i + j];
+            sum = jacobians[i].transpose() * changes[j];
+            if (i < points) continue;
             sum += shares[j] * relative.levers[i - points].dot(friction.force) * Mat3::Identity();
             if (j >= points)
                 sum += overlap(i - points, j - points) * relative.arm * friction.force.transpose();
         }
-        return factor * sum;
-    };
-    const ContactTerm::AttachedNodes nodes = contact_.attached_nodes_of(active);
+    return blocks;
+}
+
+void FrictionTerm::add_attached(const FrictionContact& each, const AttachedBlocks& blocks, double factor,
+                                NonsymmetricTangent& rest) const {
+    constexpr int points = ContactTerm::point_nodes, all = ContactTerm::attached_nodes;
+    const ContactTerm::AttachedNodes nodes = contact_.attached_nodes_of(*each.active);
     // Adds the blocks between up to four places, all or only those of the first with the others.
     const auto add = [&](const std::array<int, 4>& places, bool only_of_first) {
         NonsymmetricTangent::PairBlock& pair = rest.append_pair();
@@ -122,7 +130,8 @@ void FrictionTerm::add_attached(const FrictionContact& each, double factor, cons
             for (int b = 0; b < 4; ++b) {
                 const bool wanted =
                     places[a] >= 0 && places[b] >= 0 && (!only_of_first || (a == 0) != (b == 0));
-                pair.blocks[4 * a + b] = wanted ? block(places[a], places[b]) : Mat3(Mat3::Zero());
+                pair.blocks[4 * a + b] =
+                    wanted ? Mat3(factor * blocks[all * places[a] + places[b]]) : Mat3(Mat3::Zero());
             }
         }
     };
@@ -135,7 +144,31 @@ void FrictionTerm::add_attached(const FrictionContact& each, double factor, cons
     }
 }
 
-void FrictionTerm::vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
+void FrictionTerm::add_by_begin(const FrictionContact& each, double factor, const VectorXd& v,
+                                const VectorXd& lambda, VectorXd& out) const {
+    const auto add_blocks = [&](const auto& nodes, const std::vector<Mat3>& blocks) {
+        const std::size_t all = nodes.size();
+        for (std::size_t i = 0; i < all; ++i)
+            for (std::size_t j = 0; j < all; ++j)
+                if (nodes[i] >= 0 && nodes[j] >= 0)
+                    out.segment<3>(3 * nodes[j]) +=
+                        factor * blocks[all * i + j].transpose() * lambda.segment<3>(3 * nodes[i]);
+    };
+    const ContactTerm::ActiveContact& active = *each.active;
+    const Vec3& spin = each.obstacle.spin();
+    if (each.surface) {
+        const RoundMotion& round = *each.surface->round;
+        add_blocks(round.nodes(), round.by_positions(each.friction, active.stiffness, spin, v));
+    } else if (active.relative) {
+        add_blocks(contact_.attached_nodes_of(active), attached_blocks(each, v));
+    } else {
+        const Vec3 along = contact_.at_point(active, lambda.data());
+        contact_.distribute(active, factor * by_position(each.friction, active, spin).transpose() * along,
+                            out);
+    }
+}
+
+void FrictionTerm::vjp(const Kinematics& at, const LoadParameters&, const VectorXd& lambda,
                        KinematicsGradient& by, Gradient& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const ContactTerm::ActiveContact& active = *each.active;
@@ -144,10 +177,8 @@ void FrictionTerm::vjp(const Kinematics& at, const LoadParameters& load_paramete
         const Vec3 along = contact_.at_point(each.point(), lambda.data());
         const Vec3 by_velocity = coefficient * (friction.by_velocity * along);
         contact_.distribute(each.point(), by_velocity, by.velocity);
-        if (each.lagged) {
-            const Mat3 by_begin = coefficient * by_position(friction, active, each.obstacle.spin());
-            contact_.distribute(active, by_begin.transpose() * along, by.begin);
-        }
+        if (each.lagged) add_by_begin(each, coefficient, at.v, lambda, by.begin);
+        LoadParameters& by_load_parameters = each.lagged ? by.begin_load_parameters : out.load_parameters;
         const double by_force = -coefficient * along.dot(friction.by_normal_force);
         const ContactLaw by_law{.friction = -each.factor * along.dot(friction.force),
                                 .sticking_speed = -coefficient * along.dot(friction.by_sticking_speed)};
@@ -160,15 +191,15 @@ void FrictionTerm::vjp(const Kinematics& at, const LoadParameters& load_paramete
                 .v = at.v.data(),
                 .lambda = lambda.data(),
                 .spin = each.obstacle.spin()};
-            contact_.add_round_vjp(active, *each.surface->round, slopes, by_law, load_parameters, out);
+            contact_.add_round_vjp(active, *each.surface->round, slopes, by_law, each.obstacle, out.values,
+                                   by_load_parameters);
             continue;
         }
         ObstacleGradient by_obstacle;
         ContactTerm::obstacle_vjp(active, each.obstacle, -active.stiffness * by_force,
                                   -coefficient * (friction.by_normal.transpose() * along), -by_velocity,
                                   by_obstacle);
-        contact_.add_vjp(active, by_force, by_law, by_obstacle, out.values,
-                         each.lagged ? by.begin_load_parameters : out.load_parameters);
+        contact_.add_vjp(active, by_force, by_law, by_obstacle, out.values, by_load_parameters);
     }
 }
 

@@ -32,7 +32,7 @@ class FrictionTerm final : public ForceTerm {
   private:
     struct FrictionContact {
         const ContactTerm::ActiveContact* active;
-        std::shared_ptr<const ContactTerm::ActiveContact> surface;  // of a ball or a capsule, else nullptr
+        std::shared_ptr<const ContactTerm::ActiveContact> surface;  // of a shape, else nullptr
         bool lagged;
         double factor;  // of the coefficient of friction
         ObstacleState obstacle;
@@ -42,10 +42,17 @@ class FrictionTerm final : public ForceTerm {
         const ContactTerm::ActiveContact& point() const { return surface ? *surface : *active; }
     };
 
-    /// Adds the blocks of factor times the friction of a point and of the rigid body that carries the obstacle, by their positions.
+    /// The derivative of the friction of a point by the positions of its nodes and of the rigid body that carries the obstacle: the block
+    /// (i, j) at attached_nodes * i + j.
+    using AttachedBlocks = std::vector<Mat3>;
     /// v: velocities of all degrees of freedom.
-    void add_attached(const FrictionContact& each, double factor, const VectorXd& v,
+    AttachedBlocks attached_blocks(const FrictionContact& each, const VectorXd& v) const;
+    /// Adds a factor times these blocks to a tangent.
+    void add_attached(const FrictionContact& each, const AttachedBlocks& blocks, double factor,
                       NonsymmetricTangent& rest) const;
+    /// Adds a factor times the gradient of lambda . friction by the positions at the beginning of the step, of lagged friction.
+    void add_by_begin(const FrictionContact& each, double factor, const VectorXd& v, const VectorXd& lambda,
+                      VectorXd& out) const;
 
     const ContactTerm& contact_;
     FrictionContacts<ContactTerm::ActiveContact> contacts_;

@@ -32,17 +32,15 @@ _FACE_POINTS = {  # barycentric coordinates of the points on a face
 }
 _SMOOTHING = 1e-2  # [-] default smoothing over the mean thickness of sheets
 _SMOOTHING_OF_SOLIDS = 1e-4  # [-] default smoothing over the width, for solids alone
-_SMOOTHING_OF_SHAPES = 1e-3  # [-] default smoothing over the smallest radius of shapes
-_STICKING = (
-    1e-2  # [1/s] default sticking speed over the largest body's width, or the largest diameter of shapes
-)
+_SMOOTHING_OF_SHAPES = 1e-3  # [-] default smoothing over half the smallest width of shapes
+_STICKING = 1e-2  # [1/s] default sticking speed over the largest body's width, or that of shapes
 
 
 class Contact(Owner):
     """Keeps points of a sheet out of obstacles, with friction if wanted [Chen22, 6.1; Geilinger et al. 2020].
 
-    For two bodies, ms.Contact(a, b, ...) makes a BodyContact, which keeps them out of each other. With `shapes`, rigid balls
-    and capsules touch obstacles and each other.
+    For two bodies, ms.Contact(a, b, ...) makes a BodyContact, which keeps them out of each other. With `shapes`, rigid
+    balls, capsules and ellipsoids touch obstacles and each other.
 
     obstacles: one of ms.obstacles, or several.
     contact_stiffness: N/m, of every point: the force grows linearly with the depth, after a short parabola.
@@ -51,7 +49,7 @@ class Contact(Owner):
         its largest friction force it creeps at sticking_speed (1 - sqrt(1 - r)). By default a hundredth of the sheet's
         width per second (of the largest sheet's).
     smoothing: m, the length of the parabola; by default a hundredth of the thickness, for solids alone 1e-4 of the width,
-        for shapes a thousandth of the smallest radius.
+        for shapes a thousandth of the smallest radius or semi-axis.
     offset: m, the distance from the obstacle at which the force begins; with half the thickness the face of the sheet is
         in contact, not its middle surface.
     lagged_friction: take normal forces and normals of friction from the beginning of each step. The matrix stays
@@ -59,10 +57,11 @@ class Contact(Owner):
     vertices: those in contact; by default all, for a solid those on its surface.
     body: the Shell or Solid in contact; by default all, if no vertices are given.
     face_samples: further contact points on every face, 0, 1 or 3, for meshes that are coarse compared to the obstacle.
-    shapes: smooth spheres and capsules that rigid bodies carry, ms.obstacles.Attached objects, which touch the obstacles in
-        place of vertices. Those that are among the obstacles as well touch each other; those of one rigid body do not.
-        Each pair touches at one place, and a capsule at both ends of its axis where it touches a Plane or a hollow.
-        Where it touches a Capsule or a Box its ends are thinner by 5e-4 of its radius. Friction is never lagged.
+    shapes: smooth spheres, capsules, ellipsoids and boxes that rigid bodies carry, ms.obstacles.Attached objects, which
+        touch the obstacles in place of vertices. Those that are among the obstacles as well touch each other; those of one
+        rigid body do not. Each pair touches at one place, but where it touches a Plane or a hollow, a capsule does so at
+        both ends of its axis, and a box at its corners. Where a capsule touches a Capsule or a Box its ends are thinner by
+        5e-4 of its radius. Pairs that do not touch at one place are refused.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(2, 2))
@@ -151,8 +150,6 @@ class Contact(Owner):
         for name, given in about.items():
             if given is not None:
                 raise ValueError(f"a Contact of shapes is not about vertices: give {name} to another Contact")
-        if self.lagged_friction:
-            raise ValueError("lagged_friction is not available with shapes: use lagged_friction=False")
         if not self._rounds:
             raise ValueError("shapes and obstacles must hold two that different bodies carry")
 
@@ -208,8 +205,8 @@ class Contact(Owner):
     def _law(self, *sheets: Shell) -> tuple[float, ...]:
         """Return the values of `_replaceable` for these bodies, or for the shapes: N/m, m, m, 1, m/s."""
         if self.shapes:
-            radii = [each.radius for each in self._rounds]
-            extent, smoothing = 2.0 * max(radii), _SMOOTHING_OF_SHAPES * min(radii)
+            extent = 2.0 * max(each.most for each in self._rounds)
+            smoothing = _SMOOTHING_OF_SHAPES * min(each.least for each in self._rounds)
         else:
             extent = max(width_of(sheet.mesh) for sheet in sheets)
             thick = [sheet.thickness for sheet in sheets if isinstance(sheet, Shell)]

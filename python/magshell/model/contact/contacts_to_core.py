@@ -205,10 +205,7 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
                     {
                         "shape": numbers[id(pair.shape)],
                         "obstacle": numbers[id(pair.obstacle)],
-                        "middle": pair.middle,
-                        "half": pair.half,
-                        "radius": pair.radius,
-                        "crown": pair.crown,
+                        "core": pair.core,
                     }
                     for pair in contact._rounds
                 ],
@@ -218,14 +215,10 @@ def contact_inputs(contacts: Sequence[Contact | BodyContact], bodies: Bodies) ->
 
 
 def _check_attached(contact: Contact, vertices: np.ndarray, bodies: Bodies) -> None:
-    """Raise ValueError if an attached obstacle acts on vertices of its own rigid body, or with lagged friction."""
+    """Raise ValueError if an attached obstacle acts on vertices of its own rigid body."""
     for obstacle in contact.obstacles:
         if not isinstance(obstacle, Attached) or contact.shapes:
             continue
-        if contact.lagged_friction:
-            raise ValueError(
-                f"lagged_friction is not available with {obstacle!r:.80}: use lagged_friction=False"
-            )
         if obstacle.to.vertices is None:
             continue
         own = bodies.of(obstacle.to).first_vertex + np.asarray(obstacle.to.vertices)
@@ -243,7 +236,9 @@ def poses(obstacle: Obstacle, times: np.ndarray) -> np.ndarray:
     return np.array([(*obstacle.pose(time), *obstacle.rates(time)) for time in times]).reshape(-1, 4, 3)
 
 
-DEEPEST_START = 0.1  # [-] of the radius of a shape: the depth in an obstacle at which it may start
+DEEPEST_START = (
+    0.1  # [-] of half the smallest width of a shape: the depth in an obstacle at which it may start
+)
 # [rad] Largest rotation of the normal of a smooth surface within the smoothing of a contact; a larger one is a kink.
 LARGEST_SMOOTH_TURN = 0.3
 
@@ -308,7 +303,7 @@ def check_outside(scene: Scene, values: Any, points: np.ndarray, time: float) ->
 
 
 def _check_shapes_outside(scene: Scene, values: Any, contact: Contact, own: np.ndarray, time: float) -> None:
-    """Raise ValueError if a shape of a contact starts deeper in an obstacle than a tenth of its radius.
+    """Raise ValueError if a shape of a contact starts deeper in an obstacle than a tenth of half its width.
 
     own: the points of rigid bodies, (n, 3) m, or none if they are at rest.
     """
@@ -318,7 +313,7 @@ def _check_shapes_outside(scene: Scene, values: Any, contact: Contact, own: np.n
             for each in (pair.shape, pair.obstacle)
         )
         depth = values.current(contact).offset - gap(pair, shape, obstacle, time).distance
-        if depth > DEEPEST_START * pair.radius:
+        if depth > DEEPEST_START * pair.least:
             raise ValueError(f"{pair.shape!r:.80} starts inside {pair.obstacle!r:.80}, {depth:.3g} m deep")
 
 

@@ -25,9 +25,8 @@ class Attached(Obstacle):
         center, rotation: at rest in the world, see Obstacle; by default those of `obstacle`. They cannot change in a motion.
 
     Contact and friction with it keep the momentum and the angular momentum of the bodies that touch. A sphere, a capsule, a
-    box or an ellipsoid attached to the body of the same shape is the smooth surface of that body. A sphere or a capsule
-    touches other obstacles as well: ms.Contact(obstacles, shapes=...). Lagged friction and ms.ProjectiveDynamics do not take
-    attached obstacles.
+    box or an ellipsoid attached to the body of the same shape is the smooth surface of that body. It touches other obstacles
+    as well: ms.Contact(obstacles, shapes=...). ms.ProjectiveDynamics does not take attached obstacles.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.02, 0.02, cells=(4, 4))
