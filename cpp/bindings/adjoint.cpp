@@ -11,7 +11,7 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
     const Rows3 positions = to_rows3(by_positions);
     const VectorXd rotations = to_vector(by_edge_rotations);
     Gradient gradient;
-    RestGradient rest{by_rest, {}, {}};
+    RestGradient rest{by_rest, {}};
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
@@ -20,7 +20,7 @@ py::tuple pull_back_to_inputs(Model& model, const StaticsResult& equilibrium, co
     }
     if (!rest.asked) return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters);
     return py::make_tuple(values_to_user(model, gradient.values), gradient.load_parameters,
-                          at_nodes(model, rest.by_nodes), at_nodes(model, rest.by_prescribed));
+                          at_nodes(model, rest.by_nodes));
 }
 
 py::tuple by_parameters(const Model& model, const Gradient& gradient) {
@@ -44,7 +44,7 @@ py::tuple by_parameters_at(Model& model, const VectorXd& q, const LoadParameters
 // Returns lambda . dg/dk at a state, in equilibrium or not, for all parameters and load parameters k, and lambda . dg/dX of all nodes.
 py::tuple residual_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
                        const VectorXd& lambda, bool by_rest) {
-    RestGradient rest{by_rest, {}, {}};
+    RestGradient rest{by_rest, {}};
     const py::tuple found = by_parameters_at(model, q, load_parameters, [&](Gradient& gradient) {
         model.parameters().vjp(q, load_parameters, lambda, gradient);
         if (by_rest) rest.clear(model);
@@ -53,14 +53,17 @@ py::tuple residual_vjp(Model& model, const VectorXd& q, const LoadParameters& lo
     return py::make_tuple(found[0], found[1], rest.by_nodes);
 }
 
-// Returns dF/dq_h . dq_h/dk for all parameters and load parameters k, with the prescribed dofs q_h.
+// Returns dF/dq_h . dq_h/dk for all parameters and load parameters k, with the prescribed dofs q_h, and dF/dq_h . dq_h/dX of all nodes.
 py::tuple prescribed_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
                          const VectorXd& by_state) {
-    return by_parameters_at(model, q, load_parameters, [&](Gradient& gradient) {
+    VectorXd by_rest = VectorXd::Zero(3 * model.nodes().n_nodes());
+    const py::tuple found = by_parameters_at(model, q, load_parameters, [&](Gradient& gradient) {
         const VectorXd none = VectorXd::Zero(q.size());
-        if (model.dof_map().has_values())
-            model.dof_map().vjp(by_state, none, none, load_parameters, gradient, {});
+        const DofMap& dof_map = model.dof_map();
+        if (dof_map.has_values()) dof_map.vjp(by_state, none, none, load_parameters, gradient, {});
+        dof_map.held_rest_vjp(by_state, load_parameters, by_rest);
     });
+    return py::make_tuple(found[0], found[1], by_rest);
 }
 
 }  // namespace
@@ -97,8 +100,10 @@ void register_adjoint(py::module_& module) {
     module.def(
         "prescribed_vjp", &prescribed_vjp, py::arg("model"), py::arg("q"), py::arg("load_parameters"),
         py::arg("by_state"),
-        "by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value and "
-        "(m,) by the load parameters. For scenes without rigid parts.");
+        "by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value, "
+        "(m,) by the load parameters, and by the rest shape, three numbers per node. For scenes without "
+        "rigid "
+        "parts.");
 }
 
 }  // namespace magshell::bindings

@@ -263,9 +263,7 @@ py::dict back(Model& model, const MotionInput& input, const MotionResult& motion
     py::dict result;
     result["values"] = values_to_user(model, gradient.values);
     result["load_parameters"] = rows_of(gradient.load_parameters);
-    if (gradient.rest.asked)
-        result["rest"] = py::make_tuple(at_nodes(model, gradient.rest.by_nodes),
-                                        at_nodes(model, gradient.rest.by_prescribed));
+    if (gradient.rest.asked) result["rest"] = at_nodes(model, gradient.rest.by_nodes);
     const Rows3 by_vertices = model.bodies().gradient_by_vectors(gradient.positions);
     const Rows3 by_points = model.bodies().points(gradient.positions);  // of rigid bodies, too
     result["positions"] = by_vertices;

@@ -1397,7 +1397,7 @@ def prescribed_vjp(
     by_state: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> tuple[typing.Any, ...]:
     """
-    by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value and (m,) by the load parameters. For scenes without rigid parts.
+    by_state (size,) . dq_h/dk, with q_h what supports prescribe at a state q: (n,) by every value, (m,) by the load parameters, and by the rest shape, three numbers per node. For scenes without rigid parts.
     """
 
 def pull_back(

@@ -13,13 +13,15 @@ THICKNESS, MODULUS, MAGNETIZATION, FIELD = 2.5e-3, 4.2e6, 5.4e4, 8e-3
 ZERO = torch.zeros(3, dtype=torch.float64)
 
 
-def beam(cells=(16, 4), *, end=0.47e-3, **options):
-    """Build the beam of Tan et al. between clamps that compress it; halves are magnetized against each other."""
+def beam(cells=(16, 4), *, end=0.47e-3, rotation=None, **options):
+    """Build the beam of Tan et al. between clamps that compress it, and one of which may turn; halves are magnetized against
+    each other.
+    """
     mesh = ms.meshes.rectangle(LENGTH, WIDTH, cells=cells)
     sheet = ms.Shell(mesh, thickness=THICKNESS, young_modulus=MODULUS, poisson_ratio=0.5)
     clamps = [
         ms.Clamp(mesh.edges_at(x=0.0)),
-        ms.Clamp(mesh.edges_at(x=LENGTH), displacement=(-end, 0, 0)),
+        ms.Clamp(mesh.edges_at(x=LENGTH), displacement=(-end, 0, 0), rotation=rotation),
     ]
     return ms.Scene(sheet, supports=clamps, field=ms.UniformField(), **options)
 

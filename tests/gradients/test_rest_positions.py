@@ -242,12 +242,55 @@ def test_gradient_of_a_motion_from_an_equilibrium_near_a_magnet_agrees_with_diff
     assert found == pytest.approx((by * direction).sum(), rel=1e-6)
 
 
-def test_supports_that_rotate_in_a_motion_have_no_derivative_by_rest_positions():
+def in_a_turning_clamp(x, varies, **given):
+    """Return the motion of a sheet at rest positions x, whose clamp turns by its value in time or by the support factor."""
+    path = np.linspace((0.0, 0.1, 0.0), (0.2, 0.5, -0.3), 5)
+    clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0.0, 0.0, 1e-3), rotation=path[-1])
+    scene = ms.Scene(shell(), supports=[clamp], gravity=(1.0, 0.5, -9.81))
+    values = {scene.bodies[0]: {"rest_positions": x}}
+    if varies:
+        values[clamp] = {"rotation": path}
+    else:
+        given = {**given, "support_factor": np.linspace(0.1, 1.0, 5)}
+    return ms.simulate(scene, values=values, steps=4, time_step=4e-3, **given, **EXACT)
+
+
+@pytest.mark.parametrize("varies", [False, True], ids=["factor", "value in time"])
+@pytest.mark.parametrize(
+    "given",
+    [{}, {"integrator": ms.ImplicitEuler()}, {"stiffness_damping": 1e-3}],
+    ids=["tr_bdf2", "euler", "viscous"],
+)
+def test_gradient_by_rest_positions_of_a_motion_in_a_turning_clamp_agrees_with_differences(varies, given):
+    def loss(x):
+        move = in_a_turning_clamp(x, varies, **given)
+        return 1e3 * (WEIGHTS * tensor(move.displacements)[-1]).sum()
+
+    x = torch.tensor(MOVED, requires_grad=True)
+    loss(x).backward()
+    by = x.grad.numpy()
+    direction = by / np.linalg.norm(by)
+    at = [float(loss(MOVED + k * 5e-6 * direction)) for k in (-2, -1, 1, 2)]
+    found = (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * 5e-6)
+    assert found == pytest.approx((by * direction).sum(), rel=1e-6)
+    # The part by the held vertices alone, which the clamp turns.
+    held = np.zeros_like(by)
+    held[MESH.vertices_at(x=0.0)] = by[MESH.vertices_at(x=0.0)]
+    assert np.linalg.norm(held) > 1e-2 * np.linalg.norm(by)
+    at = [float(loss(MOVED + k * 5e-6 * held / np.linalg.norm(held))) for k in (-2, -1, 1, 2)]
+    found = (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * 5e-6)
+    assert found == pytest.approx(np.linalg.norm(held), rel=1e-6)
+    _, along = torch.func.jvp(loss, (torch.tensor(MOVED),), (torch.tensor(held),))
+    assert float(along) == pytest.approx((held**2).sum(), rel=1e-6)
+
+
+def test_motions_from_an_equilibrium_in_a_turned_clamp_have_no_derivative_by_rest_positions():
     clamp = ms.Clamp(MESH.edges_at(x=0.0), rotation=(0, 0.1, 0))
     scene = ms.Scene(shell(), supports=[clamp], gravity=(0, 0, -9.81))
-    given = torch.tensor(MOVED, requires_grad=True)
-    with pytest.raises(ms.NoGradient, match="supports that rotate yet"):
-        ms.simulate(scene, values={scene.bodies[0]: {"rest_positions": given}}, steps=1, time_step=1e-3)
+    values = {scene.bodies[0]: {"rest_positions": torch.tensor(MOVED, requires_grad=True)}}
+    rest = ms.equilibrium(scene, values=values)
+    with pytest.raises(ms.NoGradient, match="an equilibrium at the start whose supports rotate yet"):
+        ms.simulate(scene, values=values, start=rest, steps=1, time_step=1e-3)
 
 
 @pytest.mark.parametrize("viscosity", [{"stiffness_damping": 1e-3}, MAXWELL], ids=["Kelvin-Voigt", "Maxwell"])
@@ -352,9 +395,6 @@ def test_a_path_follows_a_sheet_with_other_rest_positions():
     assert path.positions[-1] == pytest.approx(end.positions, rel=0, abs=1e-8)
     with pytest.raises(ValueError, match="a path keeps those of its start"):
         ms.follow_path(scene, start=end, progress=False, **DEFAULTS)
-    given = {scene.bodies[0]: {"rest_positions": torch.tensor(MOVED, requires_grad=True)}}
-    with pytest.raises(ms.NoGradient, match="supports that rotate yet"):
-        ms.follow_path(scene, values=given, progress=False, **DEFAULTS)
 
 
 def test_the_lowest_frequency_of_a_cantilever_falls_with_the_square_of_its_length():
@@ -370,14 +410,34 @@ def test_the_lowest_frequency_of_a_cantilever_falls_with_the_square_of_its_lengt
     assert float(powers.sum()) == pytest.approx(-2.0, rel=1e-7)  # at a given thickness
 
 
-def test_terms_without_a_derivative_by_rest_positions_are_named_before_the_solve():
-    mesh = ms.meshes.rectangle(0.1, 0.06, cells=(2, 1), order=2)
-    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
-    couple = ms.EdgeCouple(mesh.edges_at(x=0.1), 1e-4)
-    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[couple])
-    solved(scene, mesh.rest_positions)
-    with pytest.raises(ms.NoGradient, match="no derivative by them of couple yet"):
-        solved(scene, torch.tensor(mesh.rest_positions, requires_grad=True))
+@pytest.mark.parametrize("couple", [2e-4, (1e-4, 3e-4, -2e-4)], ids=["number", "vector"])
+@pytest.mark.parametrize("moving", [False, True], ids=["at rest", "in motion"])
+def test_gradient_by_rest_positions_of_couples_on_six_node_shells_agrees_with_differences(couple, moving):
+    """Check a curved border, at whose two Gauss points the edges have other lengths."""
+    flat = ms.meshes.rectangle(0.1, 0.06, cells=(2, 1), order=2)
+    start = flat.rest_positions + 1.5e-3 * np.random.default_rng(4).standard_normal(flat.rest_positions.shape)
+    mesh = ms.QuadraticTriangleMesh(start, flat.elements)
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
+    load = ms.EdgeCouple(flat.edges_at(x=0.1), couple)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(flat.edges_at(x=0.0))], loads=[load])
+    weights = np.random.default_rng(5).uniform(-1, 1, start.shape)
+
+    def loss(x):
+        values = {sheet: {"rest_positions": x}}
+        if moving:
+            found = ms.simulate(scene, values=values, steps=3, time_step=5e-3, **EXACT).displacements[-1]
+        else:
+            found = ms.equilibrium(scene, values=values, **EXACT).displacements
+        return 1e3 * (torch.tensor(weights) * tensor(found)).sum()
+
+    x = torch.tensor(start, requires_grad=True)
+    loss(x).backward()
+    by = x.grad.numpy()
+    for part in (np.ones(len(start), dtype=bool), np.isin(np.arange(len(start)), flat.vertices_at(x=0.1))):
+        direction = by * part[:, None] / np.linalg.norm(by[part])
+        at = [float(loss(start + k * 5e-6 * direction)) for k in (-2, -1, 1, 2)]
+        found = (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * 5e-6)
+        assert found == pytest.approx((by * direction).sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize(

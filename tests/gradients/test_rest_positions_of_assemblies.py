@@ -7,7 +7,7 @@ import pytest
 from adjoint_scenes import MESH, N_V
 from gradient_kinds import kind
 from gradient_kinds_contact import FLAT
-from test_critical_points import BEAM, FIELD, HALVES, MIDDLE, SHEET
+from test_critical_points import FIELD, HALVES, MIDDLE, beam
 from test_rest_positions_of_solids import EXACT, compare, moved, tensor
 
 import magshell as ms
@@ -252,18 +252,23 @@ def test_members_of_a_batch_whose_rest_positions_degenerate_are_refused_before_a
         )
 
 
-def test_gradient_by_rest_positions_of_a_limit_point_agrees_with_differences_of_whole_paths():
+@pytest.mark.parametrize(
+    "rotation", [None, (0.03, 0.0, 0.002)], ids=["straight clamps", "a clamp that turns"]
+)
+def test_gradient_by_rest_positions_of_a_limit_point_agrees_with_differences_of_whole_paths(rotation):
     """Check the field at which a buckled beam snaps through, beyond where it could leave its symmetry."""
-    start = np.array(SHEET.rest_positions)
+    scene = beam(rotation=rotation)
+    sheet = scene.bodies[0]
+    start = np.array(sheet.rest_positions)
 
     def limit(rest):
-        given = {"values": {SHEET: {"rest_positions": rest}}, "remanent_magnetization": HALVES, **EXACT}
+        given = {"values": {sheet: {"rest_positions": rest}}, "remanent_magnetization": HALVES, **EXACT}
         with torch.no_grad():
-            pushed = ms.equilibrium(BEAM, applied_flux_density=(0, 0, -1e-3), **given)
-            relaxed = ms.equilibrium(BEAM, applied_flux_density=(0, 0, 0), start=pushed, **given)
+            pushed = ms.equilibrium(scene, applied_flux_density=(0, 0, -1e-3), **given)
+            relaxed = ms.equilibrium(scene, applied_flux_density=(0, 0, 0), start=pushed, **given)
         low = 0.3 * float(relaxed.positions[MIDDLE, 2])
         path = ms.follow_path(
-            BEAM,
+            scene,
             applied_flux_density=(0, 0, FIELD),
             start=relaxed,
             until=lambda _, positions: positions[MIDDLE, 2] < low,

@@ -40,6 +40,9 @@ TIP = MESH.vertices_at(x=0.1)
         "at rest, with a driven skeleton",
         "in motion, with a driven skeleton",
         "a driven skeleton on a Plane, contact implicit",
+        "at rest on an attached obstacle",
+        "at rest under a ball on a sheet",
+        "onto attached obstacles, rubbing, tr_bdf2",
     ],
 )
 def test_kinds_of_scene_with_connections_are_compared_with_differences(name):
@@ -372,17 +375,38 @@ def test_gradient_by_rest_positions_of_the_forces_of_a_foundation_agrees_with_di
     compare(loss, X, step=3e-6)
 
 
-def test_refusals_of_gradients_by_rest_positions_name_the_cause():
-    scene, body, part = carrying()
-    ball = ms.obstacles.Attached(ms.obstacles.Sphere(1e-3, center=(0.08, 0.02, 0.02)), to=part)
-    with_ball = ms.Scene(
-        [body, part],
-        supports=scene.supports,
-        field=scene.fields,
-        contacts=[ms.Contact(ball, offset=5e-4, vertices=MESH.vertices_at(x=0.0))],
-    )
-    with pytest.raises(ValueError, match="an obstacle Attached to a RigidBody with vertices"):
-        ms.equilibrium(with_ball, values={body: {"rest_positions": X}}, applied_flux_density=(0.0, 0.0, 1e-3))
+def test_rest_positions_in_a_scene_with_an_own_field_are_refused():
+    scene, body, _ = carrying()
     own = ms.Scene(body, supports=scene.supports, own_field=ms.OwnField())
     with pytest.raises(ValueError, match="an OwnField"):
         ms.equilibrium(own, values={body: {"rest_positions": X}})
+
+
+@pytest.mark.parametrize("moving", [False, True], ids=["at rest", "in motion"])
+def test_ball_on_a_rigid_part_at_other_rest_positions_touches_as_in_a_scene_made_so(moving):
+    """Check that the ball stays where it was given at rest, and touches."""
+    upper, lower, corner = kind("at rest under a ball on a sheet").scene._bodies.listed
+    ball = kind("at rest under a ball on a sheet").scene.obstacles[0]
+    moved = upper.rest_positions + 2e-4 * np.random.default_rng(1).standard_normal(upper.rest_positions.shape)
+
+    def scene_of(above, in_contact=True):
+        part = ms.RigidBody(corner.vertices, body=above, mass=4e-3, inertia=1e-6)
+        there = ms.obstacles.Attached(ms.obstacles.Sphere(0.03), to=part, center=ball.center)
+        law = {"contact_stiffness": 50.0, "offset": 1e-4, "face_samples": 1}
+        touch = [ms.Contact(there, **law, body=lower)] if in_contact else []
+        held = [ms.Clamp(MESH.edges_at(x=0.0), body=each) for each in (above, lower)]
+        return ms.Scene([above, lower, part], supports=held, contacts=touch, gravity=(0.1, 0.2, -2.0))
+
+    def solved(scene, **values):
+        if moving:
+            return ms.simulate(
+                scene, steps=6, time_step=0.02, integrator=ms.ImplicitEuler(), **values, **EXACT
+            )
+        return ms.equilibrium(scene, **values, **EXACT)
+
+    found = solved(scene_of(upper), values={upper: {"rest_positions": moved}})
+    expected = solved(scene_of(upper.replaced(rest_positions=moved)))
+    free = solved(scene_of(upper.replaced(rest_positions=moved), in_contact=False))
+    far = np.abs(np.asarray(expected.displacements)).max()
+    assert np.abs(np.asarray(found.positions - expected.positions)).max() < 1e-7 * far
+    assert np.abs(np.asarray(free.positions - expected.positions)).max() > 1e-2 * far

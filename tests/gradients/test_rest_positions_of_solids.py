@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from gradient_kinds import kind
 
 import magshell as ms
 
@@ -163,14 +162,6 @@ def test_a_solve_with_rest_positions_of_a_body_is_that_of_the_body_made_of_them(
     assert np.array_equal(rest.scene.mesh.rest_positions, x)
 
 
-def test_couples_on_six_node_elements_have_no_derivative_by_rest_positions():
-    body = sheet()
-    scene = scene_of(body, loads=[ms.EdgeCouple(body.mesh.edges_at(x=0.1), 1e-6)])
-    given = torch.tensor(body.rest_positions, requires_grad=True)
-    with pytest.raises(ms.NoGradient, match="no derivative by them of couple yet"):
-        ms.equilibrium(scene, values={body: {"rest_positions": given}}, applied_flux_density=FLUX)
-
-
 def test_tetrahedra_that_rest_positions_turn_inside_out_are_named_before_the_solve():
     body = block("linear")
     x = np.array(body.rest_positions)
@@ -178,9 +169,3 @@ def test_tetrahedra_that_rest_positions_turn_inside_out_are_named_before_the_sol
     x[nodes[0]] = 2.0 * x[nodes[1:]].mean(axis=0) - x[nodes[0]]
     with pytest.raises(ValueError, match=r"rest_positions \[m\] leave tetrahedr.*3.* flat or inside out"):
         ms.equilibrium(scene_of(body), values={body: {"rest_positions": x}}, applied_flux_density=FLUX)
-
-
-def test_scenes_that_cannot_follow_rest_positions_yet_say_so():
-    scene = kind("two sheets with their own field at rest").scene
-    with pytest.raises(ValueError, match="rest_positions cannot be replaced in a scene with"):
-        ms.equilibrium(scene, values={scene.bodies[0]: {"rest_positions": scene.bodies[0].rest_positions}})

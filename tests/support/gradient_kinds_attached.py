@@ -2,6 +2,7 @@
 
 import numpy as np
 from adjoint_scenes import MESH, N_V
+from gradient_kinds_bodies import CORNER
 from gradient_scenes import Kind
 from gradient_world import EXACT, REACH
 
@@ -73,6 +74,23 @@ def resting_on_attached() -> Kind:
     return Kind(scene, {"gravity_factor": 0.9}, fixed=EXACT, step=5e-5, reach={**REACH, **PLACE})
 
 
+def ball_on_a_sheet_at_rest() -> Kind:
+    """Build a clamped sheet whose rigid corner carries a ball, which sags onto another sheet."""
+    upper, below = _sheet(2e8), MESH.transformed(translation=(0.0, 0.0, -0.0635))
+    lower = ms.Shell(below, thickness=1e-3, young_modulus=1e9, poisson_ratio=0.4, mass_density=1e3)
+    corner = ms.RigidBody(CORNER, body=upper, mass=4e-3, inertia=1e-6)
+    middle = MESH.rest_positions[CORNER].mean(axis=0)
+    ball = ob.Attached(ob.Sphere(0.03), to=corner, center=np.add(middle, (1e-3, -5e-4, -0.0325)))
+    scene = ms.Scene(
+        [upper, lower, corner],
+        supports=[ms.Clamp(MESH.edges_at(x=0.0), body=each) for each in (upper, lower)],
+        contacts=[ms.Contact(ball, **{**LAW, "face_samples": 1}, body=lower)],
+        gravity=(0.1, 0.2, -2.0),
+    )
+    reach = {**REACH, **PLACE, "rest_positions": 0.02}
+    return Kind(scene, {"gravity_factor": 0.9}, fixed=EXACT, step=5e-5, reach=reach)
+
+
 def thrown_onto_a_moving_ellipsoid() -> Kind:
     egg = ob.Ellipsoid((0.06, 0.05, 0.03), center=(0.05, 0.03, -0.0315), rotation=(0.05, -0.02, 0.2))
     scene = ms.Scene(
@@ -97,5 +115,6 @@ ATTACHED_MAKERS = {
         ms.TRBDF2(), **RUBS, lagged_friction=True
     ),
     "at rest on an attached obstacle": resting_on_attached,
+    "at rest under a ball on a sheet": ball_on_a_sheet_at_rest,
     "onto an Ellipsoid that moves": thrown_onto_a_moving_ellipsoid,
 }

@@ -52,6 +52,8 @@ def six_nodes_at_rest() -> Kind:
         ms.AreaLoad((0.1, 0, 0.2), faces=[1, 2, 7], body=sheet),
         ms.SurfaceTension(RNG.uniform(0.1, 0.2, 3), faces=[1, 4, 7], body=sheet),
         ms.Pressure(RNG.uniform(-1.0, 2.0, 3), faces=[0, 2, 9], body=sheet),
+        ms.EdgeCouple(mesh.edges_at(x=0.1), 2e-4, body=sheet),
+        ms.EdgeCouple(mesh.edges_at(y=0.06), (3e-4, 0, 1e-4), body=sheet),
     ]
     supports = [
         ms.Clamp(mesh.edges_at(x=0.0), displacement=(1e-4, 0, 5e-4), rotation=(0, 0.1, 0.05), body=sheet),

@@ -431,7 +431,7 @@ class Backward {
             model_.assemble_forces(load_parameters);
             const VectorXd reaction = product(lambda, *proximal.weights) + by_q;
             const VectorXd gradient = newton_.gradient(q, proximal);
-            g_.rest.add_constrained(dof_map, reaction, lambda, gradient, by_motor_forces);
+            g_.rest.add_constrained(dof_map, reaction, lambda, gradient, load_parameters, by_motor_forces);
             if (dof_map.has_values())
                 dof_map.vjp(reaction, lambda, gradient, load_parameters, scene_, by_motor_forces);
         }

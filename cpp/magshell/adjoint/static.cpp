@@ -44,7 +44,7 @@ Gradient equilibrium_vjp(Model& model, const StaticsResult& equilibrium, const V
     if (rest.asked) {
         rest.clear(model);
         rest.add(model, q, load_parameters, lambda + motors);
-        rest.add_constrained(dof_map, by_q, lambda, model.residual().gradient,
+        rest.add_constrained(dof_map, by_q, lambda, model.residual().gradient, load_parameters,
                              has_motor_gradient ? by_motor_forces : VectorXd());
     }
     if (dof_map.has_values()) {

@@ -296,6 +296,18 @@ void DofMap::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorX
     }
 }
 
+void DofMap::held_rest_vjp(const VectorXd& by_state, const LoadParameters& load_parameters,
+                           VectorXd& by_nodes) const {
+    const double t = support_factor(load_parameters);
+    for (const PrescribedNode& h : prescribed_)
+        for (int axis = 0; axis < h.n_prescribed; ++axis) {
+            const Vec3 along = h.frame.col(axis),
+                       by_position = along * along.dot(by_state.segment<3>(3 * h.node));
+            const Index move = h.moves[axis];
+            by_nodes.segment<3>(3 * h.node) += move < 0 ? by_position : moves_[move].by_rest(t, by_position);
+        }
+}
+
 void DofMap::rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
                       const VectorXd& by_motor_forces, VectorXd& by_nodes) const {
     if (!reduced_) return;

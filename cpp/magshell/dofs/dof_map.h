@@ -81,6 +81,10 @@ class DofMap {
     /// node; arguments as in vjp.
     void rest_vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorXd& gradient,
                   const VectorXd& by_motor_forces, VectorXd& by_nodes) const;
+    /// Adds the gradient with respect to the rest positions and directions of nodes that supports hold, three numbers per node. by_state:
+    /// gradient with respect to where they hold them.
+    void held_rest_vjp(const VectorXd& by_state, const LoadParameters& load_parameters,
+                       VectorXd& by_nodes) const;
     /// Adds to the forces K p of a prescribed increment those due to the curved paths of motor-driven nodes.
     void add_motor_increment_forces(const VectorXd& gradient, const VectorXd& move, VectorXd& forces) const;
     /// Returns the forces [N] and moments [N m] of the motors, one after another, for a gradient of the energy.

@@ -12,6 +12,10 @@ Vec3 SupportMove::direction(const Vec3& rest, double factor) const {
     return rotation(factor * rotation_vector) * rest;
 }
 
+Vec3 SupportMove::by_rest(double factor, const Vec3& by_position) const {
+    return rotation(factor * rotation_vector).transpose() * by_position;
+}
+
 Vec3 SupportMove::point_rate(const Vec3& rest, double factor) const {
     return direction_rate(rest - center, factor) + translation;
 }

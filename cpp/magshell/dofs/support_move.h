@@ -14,6 +14,9 @@ struct SupportMove {
     Vec3 point(const Vec3& rest, double factor) const;
     Vec3 direction(const Vec3& rest, double factor) const;
 
+    /// Returns the gradient by `rest` of `by_position` . point(rest) or . direction(rest), at the same center.
+    Vec3 by_rest(double factor, const Vec3& by_position) const;
+
     /// Return their derivatives with respect to the support factor.
     Vec3 point_rate(const Vec3& rest, double factor) const;
     Vec3 direction_rate(const Vec3& rest, double factor) const;

@@ -9,7 +9,6 @@
 #include "magshell/terms/joint/joint_term.h"
 #include "magshell/terms/joint/torque_term.h"
 #include "magshell/terms/load/body_force_term.h"
-#include "magshell/terms/load/edge_moment_term.h"
 #include "magshell/terms/load/face_energy.h"
 #include "magshell/terms/load/group_energy_term.h"
 #include "magshell/terms/load/load_term.h"
@@ -31,8 +30,6 @@ bool is_one_of(const auto& term) {
 // Returns true if add_rest_vjp() is complete for a term: it has the derivatives, or reads no rest shape, as terms whose
 // forces follow from present positions and from values that the caller computes.
 bool rest_gradient_is_complete(const Term& term) {
-    if (const auto* const moments = dynamic_cast<const EdgeMomentTerm*>(&term))
-        return !moments->reads_rest_lengths();
     return is_one_of<RestShapeTerm, LoadTerm, PressureTerm, ContactTerm, FaceEnergyTerm<SurfaceTension>,
                      GroupEnergyTerm, SpringTerm, MomentTerm, BodyForceTerm, TorqueTerm, JointTerm,
                      DamperTerm>(term);

@@ -75,20 +75,27 @@ std::array<EdgeMomentTerm::EdgeMoment, 2> couples_of(const EdgeMomentInput& give
     SimdVec3 x[9] = {};
     for (int k = 0; k < 7; ++k) x[k] = broadcast(at.rest[nodes[k]]);
     const FaceSideSix& side = shell.sides[f][i];
+    const std::array<double, 3> along[2] = {six_nodes::along(six_nodes::gauss[0]),
+                                            six_nodes::along(six_nodes::gauss[1])};
+    Vec3 tangents[2];
     double lengths[2];
     for (int g = 0; g < 2; ++g) {
-        const std::array<double, 3> along = six_nodes::along(six_nodes::gauss[g]);
         const std::array<Vec3, 6>& rest = shell.rest[f];
-        lengths[g] = (along[0] * rest[from] + along[1] * rest[to] + along[2] * rest[middle(i)]).norm();
+        tangents[g] = along[g][0] * rest[from] + along[g][1] * rest[to] + along[g][2] * rest[middle(i)];
+        lengths[g] = tangents[g].norm();
+        tangents[g] /= lengths[g];
     }
+    const double length = lengths[0] + lengths[1];
     const auto at_point = [&](int g) {
-        return EdgeMomentTerm::EdgeMoment{nodes,
-                                          g,
-                                          DihedralAngleSix(x, SimdDouble(0.0), g).angle()[0],
-                                          side.rotation[g],
-                                          side.sign,
-                                          0,
-                                          lengths[g] / (lengths[0] + lengths[1])};
+        const double share = lengths[g] / length;
+        std::array<Vec3, 3> by_rest;
+        for (int node = 0; node < 3; ++node)
+            by_rest[node] = (along[g][node] * tangents[g] -
+                             share * (along[0][node] * tangents[0] + along[1][node] * tangents[1])) /
+                            length;
+        return EdgeMomentTerm::EdgeMoment{
+            nodes, g,      DihedralAngleSix(x, SimdDouble(0.0), g).angle()[0], side.rotation[g], side.sign, 0,
+            share, by_rest};
     };
     return {at_point(0), at_point(1)};
 }

@@ -68,6 +68,16 @@ double EdgeMomentTerm::unwrapped_angle(const double* q, std::size_t k) const {
     return unwrapped_angles_[k] + std::remainder(turned - unwrapped_angles_[k], 2.0 * std::numbers::pi);
 }
 
+double EdgeMomentTerm::rotation_rate(const EdgeMoment& couple, const double* q, const double* lambda) const {
+    const Nine g = gradient(couple, q);
+    double rate = 0.0;
+    for (int node = 0; node < 9; ++node)
+        if (couple.nodes[node] >= 0)
+            rate += lane_of(g[node], 0).dot(Eigen::Map<const Vec3>(lambda + 3 * couple.nodes[node]));
+    if (couple.rotation >= 0) rate -= couple.rotation_sign * lambda[first_scalar_ + couple.rotation];
+    return rate;
+}
+
 double EdgeMomentTerm::energy(const double* q, const LoadParameters& load_parameters) const {
     double work = 0.0;
     for (std::size_t k = 0; k < couples_.size(); ++k) {
@@ -98,16 +108,21 @@ bool EdgeMomentTerm::set_values(const Values& values) {
 
 void EdgeMomentTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                          Gradient& out) {
-    for (std::size_t k = 0; k < couples_.size(); ++k) {
-        const EdgeMoment& couple = couples_[k];
-        const Nine g = gradient(couple, q);
-        double turn_rate = 0.0;
-        for (int node = 0; node < 9; ++node)
-            if (couple.nodes[node] >= 0)
-                turn_rate += lane_of(g[node], 0).dot(Eigen::Map<const Vec3>(lambda + 3 * couple.nodes[node]));
-        if (couple.rotation >= 0) turn_rate -= couple.rotation_sign * lambda[first_scalar_ + couple.rotation];
-        out.values[slice_.at(couple.row)] -= load_parameters[factor_.first] * couple.share * turn_rate;
-        out.load_parameters[factor_.first] -= couple.couple * turn_rate;
+    for (const EdgeMoment& couple : couples_) {
+        const double rate = rotation_rate(couple, q, lambda);
+        out.values[slice_.at(couple.row)] -= load_parameters[factor_.first] * couple.share * rate;
+        out.load_parameters[factor_.first] -= couple.couple * rate;
+    }
+}
+
+void EdgeMomentTerm::add_rest_vjp(const double* q, const LoadParameters& load_parameters,
+                                  const double* lambda, VectorXd& out) {
+    for (const EdgeMoment& couple : couples_) {
+        if (couple.point < 0) continue;
+        const double by_share =
+            -load_parameters[factor_.first] * couple.couple / couple.share * rotation_rate(couple, q, lambda);
+        for (int node = 0; node < 3; ++node)
+            out.segment<3>(3 * couple.nodes[node]) += by_share * couple.share_by_rest[node];
     }
 }
 

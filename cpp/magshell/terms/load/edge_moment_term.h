@@ -10,15 +10,14 @@
 // divided between the two Gauss points of the edge.
 #pragma once
 
-#include <algorithm>
-
 #include "magshell/assembly/lanes.h"
 #include "magshell/body/nodes.h"
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/term.h"
 
 namespace magshell {
 
-class EdgeMomentTerm final : public Term {
+class EdgeMomentTerm final : public Term, public RestShapeTerm {
   public:
     struct EdgeMoment {
         // On a linear triangle: start and end of the edge, the third corner of the face, and the fixed direction. On a
@@ -30,7 +29,9 @@ class EdgeMomentTerm final : public Term {
         double rotation_sign;  // s
         Index row;             // index of the caller's couple
         double share = 1.0;    // fraction of the caller's couple that acts here
-        double couple = 0.0;   // C [N m], that fraction
+        // The derivative of `share` by the rest positions of nodes 0, 1 and 2.
+        std::array<Vec3, 3> share_by_rest = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+        double couple = 0.0;  // C [N m], that fraction
     };
     using Nine = std::array<SimdVec3, 9>;
 
@@ -44,11 +45,6 @@ class EdgeMomentTerm final : public Term {
                    Index rows, Registry& registry);
 
     std::string_view name() const override { return "couple"; }
-    /// Returns true on quadratic triangles, where the fractions of the Gauss points depend on the lengths at rest.
-    bool reads_rest_lengths() const {
-        return std::any_of(couples_.begin(), couples_.end(),
-                           [](const EdgeMoment& couple) { return couple.point >= 0; });
-    }
     bool set_values(const Values& values) override;
     double energy(const double* q, const LoadParameters& load_parameters) const override;
     void evaluate(const double* q, const LoadParameters& load_parameters, Residual& out) override;
@@ -56,6 +52,9 @@ class EdgeMomentTerm final : public Term {
                          SystemMatrix& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    /// On quadratic triangles the fractions of the Gauss points depend on the lengths at rest.
+    void add_rest_vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                      VectorXd& out) override;
     std::vector<double> angle_branches() const override { return unwrapped_angles_; }
     void set_angle_branches(const std::vector<double>& angle_branches) override {
         unwrapped_angles_ = angle_branches;
@@ -65,6 +64,8 @@ class EdgeMomentTerm final : public Term {
   private:
     /// Returns theta_d - theta~_d of the k-th entry, with as many full turns as make it nearest to its value at the last evaluated state.
     double unwrapped_angle(const double* q, std::size_t k) const;
+    /// Returns d psi/dq . lambda.
+    double rotation_rate(const EdgeMoment& couple, const double* q, const double* lambda) const;
 
     const Index first_scalar_;
     ParameterSlice slice_, factor_;

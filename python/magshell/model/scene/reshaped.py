@@ -13,6 +13,7 @@ from ..._runtime.frozen import remember, variant
 from ...errors import NoGradient
 from ..actuators.tendon import Tendon
 from ..contact.body_contact import SelfContact
+from ..contact.contact import Contact
 from ..contact.obstacles.attached import Attached
 from ..loads.spring import Spring
 from ..rigid.rigid import RigidBody
@@ -46,13 +47,17 @@ def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] = ()) ->
     no_gradient_with: words for what has no derivative by rest positions in this kind of solve only.
 
     Without rest_positions among the values, both are returned unchanged. Raises ValueError for rest positions that do
-    not fit, or in a scene with something that cannot follow them; NoGradient if a gradient by them is asked for and
+    not fit, or in a scene with an OwnField; NoGradient if a gradient by them is asked for and
     something in the scene has none.
     """
     given = _rest_positions(scene, values)
     if not given:
         return scene, values
-    _refuse_what_cannot_follow(scene)
+    if scene.own_field:
+        raise ValueError(
+            f"{REST} cannot be replaced in a scene with an OwnField yet: make the scene anew from a mesh with these rest "
+            "positions"
+        )
     numbers = {body: _numbers(body, value) for body, value in given.items()}
     there = _made(scene, numbers)
     if any(requires_gradient(value) for value in given.values()):
@@ -61,10 +66,12 @@ def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] = ()) ->
 
 
 def turning_supports(scene: Scene) -> list[str]:
-    """Return words for supports that rotate, if any: on paths and in motions they have no derivative by rest positions."""
+    """Return words for supports that rotate, if any: at the start of a motion they have no derivative by rest positions."""
     supports = getattr(scene, "supports", ())  # what is no Scene is refused later, by the solve
     moved = [support for support in supports if isinstance(support, Pin | Clamp)]
-    return ["supports that rotate"] * any(each._move.rotation is not None for each in moved)
+    return ["an equilibrium at the start whose supports rotate"] * any(
+        each._move.rotation is not None for each in moved
+    )
 
 
 def without_rest_positions(scene: Scene, values: dict[Any, dict[str, Any]]) -> dict[Any, dict[str, Any]]:
@@ -159,6 +166,15 @@ def _with_rest(
             now[id(item)] = stand_ins[id(item)] = found
         return found
 
+    def carry(obstacles: list[Any]) -> None:
+        """Attach obstacles to the stand-ins of the bodies that carry them; they stay where they were at rest."""
+        for each in obstacles:
+            if isinstance(each, Attached) and id(each) not in now and id(each.to) in stand_ins:
+                to = stand_ins[id(each.to)]
+                now[id(each)] = stand_ins[id(each)] = Attached(
+                    each.obstacle, to, center=each.center, rotation=each.rotation
+                )
+
     def stand_in(item: Any) -> Any:
         if isinstance(item, RigidBody):
             return link_there(item)
@@ -171,6 +187,8 @@ def _with_rest(
         elif isinstance(item, Tendon | Spring):
             found = item._on_reshaped(now)
         else:
+            if isinstance(item, Contact):
+                carry([*item.obstacles, *item.shapes])
             found = now.get(id(item)) or _about(item, now)
         if found is not item:
             stand_ins[id(item)] = found
@@ -246,23 +264,6 @@ def _check_same_supports(scene: Scene, there: Scene) -> None:
 def _tied_vertices(scene: Scene) -> set[tuple[int, ...]]:
     """Return the vertices of each equation between displacements, in one tuple."""
     return {tuple(row) for each in scene._constraints.equations for row in each.vertices.tolist()}
-
-
-def _refuse_what_cannot_follow(scene: Scene) -> None:
-    carriers = [each.to for each in scene.obstacles if isinstance(each, Attached)]
-    has = (
-        ("an OwnField", scene.own_field),
-        (
-            "an obstacle Attached to a RigidBody with vertices",
-            any(each.vertices is not None for each in carriers),
-        ),
-    )
-    found = [name for name, some in has if some]
-    if found:
-        raise ValueError(
-            f"{REST} cannot be replaced in a scene with {' and '.join(found)} yet: make the scene anew from a mesh with "
-            "these rest positions"
-        )
 
 
 def _refuse_without_gradient(scene: Scene, others: Sequence[str]) -> None:

@@ -24,7 +24,7 @@ from ..loads.foundation import ElasticFoundation
 from ..loads.loads import AreaLoad, EdgeCouple, EdgeLoad
 from ..loads.spring import Spring
 from ..supports.displacement_ties import DisplacementTie
-from ..supports.supports import Clamp, rotation_matrix
+from ..supports.supports import Clamp
 
 if TYPE_CHECKING:
     from ..shells.shell import Shell
@@ -56,10 +56,9 @@ def by_rest_positions(inputs: Inputs, body: Shell | Solid, gradient: Gradient) -
         raise NoGradient("no gradient by rest_positions: this function has none")
     values, scene = inputs.values, inputs.scene
     span = scene._bodies.spans[scene._bodies.number(body)]
-    shape, prescribed = (AtNodes(*each) for each in gradient.rest)
-    held = _by_rest_of_held(inputs, prescribed)
-    found = (shape.vertices + held.vertices)[span.vertices]
-    found += _through_directions(values, span, shape.directions + held.directions)
+    shape = AtNodes(*gradient.rest)
+    found = shape.vertices[span.vertices]
+    found += _through_directions(values, span, shape.directions)
     found += _through_moves(values, span, gradient)
     found += _through_contacts(values, body, gradient)
     found += _through_masses(values, values.current(body), span, gradient)
@@ -89,26 +88,6 @@ def _through_rigid_centers(values: Values, body: Shell | Solid, gradient: Gradie
         by_center = part._gradients(label, values, gradient)["center"]
         np.add.at(found, own.vertices, by_center / len(own.vertices))
     return found
-
-
-def _by_rest_of_held(inputs: Inputs, prescribed: AtNodes) -> AtNodes:
-    """Return the gradient by where supports hold nodes at rest, from that by where they hold them in this solve."""
-    constraints, scene = inputs.values.constraints, inputs.scene
-    rows = np.concatenate([prescribed.vertices, prescribed.directions])
-    factor = float(scene._load_parameter_layout.of(inputs.load_parameters, "scene", "support_factor")[0])
-    turns = [rotation_matrix(factor * move.rotation) for move in constraints.moves]
-    found = np.zeros_like(rows)
-    nodes, counts = constraints.held_nodes[:, 0], constraints.held_nodes[:, 1]
-    for axis in range(3):
-        here = counts > axis
-        along = constraints.held_frames[here, :, axis]
-        part = along * (along * rows[nodes[here]]).sum(axis=1, keepdims=True)
-        moves = constraints.held_nodes[here, 2 + axis]
-        for k in np.unique(moves[moves >= 0]):
-            part[moves == k] = part[moves == k] @ turns[k]
-        found[nodes[here]] += part
-    n_v = len(prescribed.vertices)
-    return AtNodes(found[:n_v], found[n_v:])
 
 
 def _through_directions(values: Values, span: Any, of_directions: np.ndarray) -> np.ndarray:

@@ -50,8 +50,8 @@ class MotionAdjoint:
             )
         rest = found_by.pop("rest", None)
         if rest is not None and asked.starts_at_rest:
-            (by_vertices, by_directions), prescribed = rest
-            rest = (by_vertices + found_by["positions"], by_directions), prescribed
+            by_vertices, by_directions = rest
+            rest = by_vertices + found_by["positions"], by_directions
         gradient = Gradient(
             inputs.scene, found_by.pop("values"), found_by.pop("load_parameters"), found_by, rest=rest
         )

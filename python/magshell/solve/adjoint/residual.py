@@ -175,8 +175,9 @@ class Residual:
             flat[part] = row[: part.stop - part.start]
         return Derivatives(*np.split(flat, np.cumsum([each.size for each in zero])[:-1]))
 
-    def prescribed(self, by_state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return derivatives by values and load parameters through what supports prescribe, from those by unknowns."""
+    def prescribed(self, by_state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return derivatives by values, load parameters and rest shape through what supports prescribe, from those by
+        unknowns."""
         return _core.prescribed_vjp(self._model, self.state, self.load_parameters, by_state)
 
     def by_inputs(self, derivatives: Derivatives, masses: np.ndarray | None = None) -> Gradient:
@@ -188,9 +189,7 @@ class Residual:
         others = {} if masses is None else {"mass": masses}
         rest = None
         if self.with_rest:
-            model = self._model
-            held = derivatives.by_state - model.expand(model.reduce(derivatives.by_state))
-            rest = [_core.at_nodes(model, each) for each in (derivatives.by_rest, held)]
+            rest = _core.at_nodes(self._model, derivatives.by_rest + through[2])
         by_values, by_load_parameters = (
             derivatives.by_values + through[0],
             derivatives.by_load_parameters + through[1],

@@ -39,7 +39,7 @@ class Adjoint:
             by_values, by_load_parameters, *rest = _core.pull_back(
                 model, self._found, *by_outputs, requires_rest(inputs, wanted)
             )
-        gradient = Gradient(inputs.scene, by_values, by_load_parameters, rest=rest or None)
+        gradient = Gradient(inputs.scene, by_values, by_load_parameters, rest=rest[0] if rest else None)
         leaves = zip(inputs.leaves, wanted, strict=True)
         return [by_leaf(inputs, leaf, gradient) if asked else None for leaf, asked in leaves]
 

@@ -42,6 +42,7 @@ from ..options import (
     ProjectiveDynamics,
     as_adjoint_storage,
 )
+from ..statics.equilibrium import Equilibrium
 from .conditions import MotionConditions
 from .differentiable_state import DifferentiableState
 from .motion_inputs import MotionInputs
@@ -216,7 +217,8 @@ def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
     Raises ValueError too for a state from which the motion cannot go on with these.
     """
     last = vars(scene).get("_reshaped", (None, scene))[1]
-    there, values = reshaped(scene, values, no_gradient_with=turning_supports(scene))
+    turned = turning_supports(scene) if isinstance(start, Equilibrium) else ()
+    there, values = reshaped(scene, values, no_gradient_with=turned)
     if there not in (scene, last) and isinstance(start, MotionState | DifferentiableState):
         raise ValueError(
             "start is the state of a motion at other rest_positions: hand over its "

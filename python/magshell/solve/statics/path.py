@@ -28,7 +28,7 @@ from ...model.results.solid_result import describe_strains
 from ...model.scene.element_sampling import has_elements
 from ...model.scene.field_sampling import is_suspect, sampling_errors, warn_of_elements, warn_of_sampling
 from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
-from ...model.scene.reshaped import reshaped, turning_supports
+from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs, plain_inputs
 from ...model.scene.values import Values
@@ -338,9 +338,7 @@ def follow_path(
     until = _checked_until(until)
     if start is not None and not isinstance(start, Equilibrium):
         raise ValueError(f"start must be an Equilibrium of this scene, got {type(start).__name__}")
-    scene, arguments["values"] = reshaped(
-        scene, arguments["values"], no_gradient_with=turning_supports(scene)
-    )
+    scene, arguments["values"] = reshaped(scene, arguments["values"])
     if start is not None and start.scene is not scene and start.scene._family is scene._family:
         raise ValueError("start is an equilibrium at other rest_positions: a path keeps those of its start")
     inputs = plain_inputs(scene, differentiable=True, **arguments)
