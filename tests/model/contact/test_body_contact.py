@@ -6,6 +6,7 @@ import scipy.sparse as sparse
 from body_contact_scenes import DOWN, PLATE, SOFT, above, two_sheets
 
 import magshell as ms
+from magshell import _core
 
 TILTED = np.array([[1.0, 0, 0], [0, 0.8, -0.6], [0, 0.6, 0.8]])
 
@@ -128,6 +129,56 @@ def test_ball_falls_onto_a_sheet_and_never_through(integrator):
     assert move[sheet].positions[..., 2].min() < -2e-3  # the sheet is deflected
     middles = move[ball].positions.mean(1)[:, 2]
     assert middles.min() > move[sheet].positions[..., 2].min()
+
+
+def ball_far_above_a_sheet(height):
+    mesh = ms.meshes.rectangle(0.1, 0.1, cells=(6, 6))
+    sheet = ms.Shell(mesh, **SOFT)
+    ball = ms.Solid(
+        ms.meshes.ball(0.02, cells=2).transformed(translation=(0.05, 0.05, height)),
+        material=ms.NeoHookean(young_modulus=2e5, poisson_ratio=0.4),
+        mass_density=1e3,
+        element="linear",
+    )
+    scene = ms.Scene(
+        [ball, sheet],
+        supports=[ms.Pin(mesh.boundary_vertices, body=sheet)],
+        contacts=[ms.Contact(ball, sheet)],
+        gravity=DOWN,
+        allow_rigid_motions=True,
+    )
+    return scene, ball
+
+
+def test_a_body_in_free_fall_takes_few_factorizations():
+    """Move a body by a hundred edges in each step, farther than one search for contacts looks.
+
+    Each iteration was limited to twenty edges before: 23 factorizations a step.
+    """
+    scene, ball = ball_far_above_a_sheet(0.1)
+    velocities = np.zeros((scene.mesh.n_vertices, 3))
+    velocities[: ball.mesh.n_vertices, 2] = 1e3
+    steps, time_step = 4, 2e-3
+    move = ms.simulate(scene, steps=steps, time_step=time_step, velocities=velocities, progress=False)
+    assert move.factorizations <= 5 * steps
+    fall = 9.81 * time_step**2 * steps * (steps + 1) / 2  # of implicit Euler
+    risen = move[ball].positions[-1].mean(0)[2] - move[ball].positions[0].mean(0)[2]
+    assert risen == pytest.approx(1e3 * steps * time_step - fall, abs=1e-8)
+
+
+@pytest.mark.parametrize("height", [0.03, 0.3, 1.0, 2.0])
+def test_a_step_over_many_edges_stops_before_a_sheet(height):
+    scene, ball = ball_far_above_a_sheet(height)
+    model, start = scene._model, scene.mesh.rest_positions
+    down = np.zeros_like(start)
+    down[: ball.mesh.n_vertices, 2] = -3.0
+    q, end = (model.state(x, np.zeros(scene.mesh.n_edges)) for x in (start, start + down))
+
+    def lowest(state):
+        return model.positions(state)[: ball.mesh.n_vertices, 2].min()
+
+    assert 0.0 < lowest(_core.moved(model, q, end - q)) < 0.3 * lowest(q)
+    assert lowest(_core.moved(model, q, q - end)) == pytest.approx(lowest(q) + 0.9 * 3.0)  # a free path
 
 
 @pytest.mark.parametrize("lagged", [False, True])

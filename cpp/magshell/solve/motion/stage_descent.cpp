@@ -38,26 +38,9 @@ class DescendingSteps final : public NewtonIteration {
     bool begin() override { return true; }
     bool is_done() override { return report_.residual <= enough_ || report_.iterations == max_iterations_; }
 
-    // Factorizes with the least shift that makes the pivots positive. Returns false, with a reason in the report, if none does.
-    bool factorize_definite() {
-        // Factor by which the shift is raised and lowered, and the largest shift [-]; see test_a_rolling_sheet_takes_whole_steps.
-        constexpr double shift_factor = 4.0, largest_shift = 1e12;
-        Eigen::MatrixXd no_moves(q_.size(), 0);
-        shift_ = shift_ > 1.0 ? shift_ / shift_factor : 0.0;
-        for (; shift_ <= largest_shift; shift_ = std::max(1.0, shift_factor * shift_)) {
-            // The target moves with the weights so that the gradient at q does not change.
-            const VectorXd weights = (1.0 + shift_) * *proximal_.weights,
-                           target = q_ - (q_ - *proximal_.target) / (1.0 + shift_);
-            const ProximalTerm shifted{&weights, &target, proximal_.motion};
-            report_.factor = newton_.factorize(q_, load_parameters_, false, shifted, no_moves, false);
-            if (report_.factor.succeeded && report_.factor.negative_pivots == 0) return true;
-        }
-        return fail("the energy of the stage has no minimum nearby");
-    }
-
     bool step() override {
         const VectorXd force = -newton_.gradient(q_, proximal_), from = q_;
-        if (!factorize_definite()) return false;
+        if (!factorize_definite(false, shift_)) return false;
         VectorXd step = newton_.solve_with_factor(force);
         if (!(force.dot(step) > 0.0)) return fail("the energy does not fall along the step");
         const double length = largest_displacement(model_, step);

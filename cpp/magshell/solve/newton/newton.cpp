@@ -308,6 +308,13 @@ VectorXd Newton::solve_with_factor(const VectorXd& rhs, double tolerance) const 
     return model_.dof_map().expand(reduced);
 }
 
+VectorXd Newton::solve_with_symmetric_part(const VectorXd& rhs) const {
+    const Stopwatch running(linear_time_);
+    VectorXd reduced = model_.dof_map().vector(rhs);
+    factor_->solve(reduced);
+    return model_.dof_map().expand(reduced);
+}
+
 VectorXd Newton::solve_transposed(const VectorXd& rhs) const {
     if (!unsymmetric_) return solve_with_factor(rhs, to_round_off.tolerance);
     const Stopwatch running(linear_time_);

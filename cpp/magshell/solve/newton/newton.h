@@ -132,6 +132,8 @@ class Newton {
     /// Returns p with K p = rhs by the last factorization; both are of all dofs, zero where prescribed. tolerance: residual over rhs,
     /// used only where GMRES is needed: if K is nonsymmetric or not a sparse matrix.
     VectorXd solve_with_factor(const VectorXd& rhs, double tolerance = 1e-9) const;
+    /// Returns p with S p = rhs, where S is the symmetric part of K that was factorized last: with friction, that of held normal forces.
+    VectorXd solve_with_symmetric_part(const VectorXd& rhs) const;
     /// Returns p with K^T p = rhs, to round-off. Throws InvalidInput if K is too nonsymmetric for that.
     VectorXd solve_transposed(const VectorXd& rhs) const;
 

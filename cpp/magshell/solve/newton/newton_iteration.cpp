@@ -26,6 +26,22 @@ NewtonReport NewtonIteration::run() {
     }
 }
 
+bool NewtonIteration::factorize_definite(bool project_psd, double& shift) {
+    // Factor by which the shift is raised and lowered, and the largest shift [-]; see test_a_rolling_sheet_takes_whole_steps.
+    constexpr double shift_factor = 4.0, largest_shift = 1e12;
+    Eigen::MatrixXd no_moves(q_.size(), 0);
+    shift = shift > 1.0 ? shift / shift_factor : 0.0;
+    for (; shift <= largest_shift; shift = std::max(1.0, shift_factor * shift)) {
+        // The target moves with the weights so that the gradient at q does not change.
+        const VectorXd weights = (1.0 + shift) * *proximal_.weights,
+                       target = q_ - (q_ - *proximal_.target) / (1.0 + shift);
+        const ProximalTerm shifted{&weights, &target, proximal_.motion};
+        report_.factor = newton_.factorize(q_, load_parameters_, false, shifted, no_moves, project_psd);
+        if (report_.factor.succeeded && report_.factor.negative_pivots == 0) return true;
+    }
+    return fail("the energy of the stage has no minimum nearby");
+}
+
 bool NewtonIteration::begin() {
     if (std::string reason = model_.capabilities().invalid_state_reason(q_); !reason.empty())
         return fail(std::move(reason));
@@ -254,7 +270,7 @@ class FullSteps final : public NewtonIteration {
 };
 
 // Standard steps with a line search on the slope of the energy, with matrices projected to be positive semidefinite far from the
-// solution. A barrier requires it.
+// solution. A barrier requires it. In a time stage they always go downhill: a matrix with negative pivots serves no step.
 class SearchedSteps final : public NewtonIteration {
   public:
     SearchedSteps(Newton& newton, VectorXd& q, const LoadParameters& load_parameters,
@@ -269,8 +285,9 @@ class SearchedSteps final : public NewtonIteration {
     }
 
     bool step() override {
+        if (!makes_progress()) return fail("the search makes no progress");
         const bool in_place = move_.isZero(0.0);
-        // After a projected matrix and a full step, the exact matrix may do; its step shows whether it does.
+        // After a projected matrix and a full step, the exact matrix may do; its pivots and its step show whether it does.
         bool project_psd =
             alpha_ < 1.0 || (!was_projected_ && report_.residual > progress_part * last_residual_);
         last_residual_ = report_.residual;
@@ -278,12 +295,23 @@ class SearchedSteps final : public NewtonIteration {
         VectorXd step;
         double slope = 0.0;
         for (;; project_psd = true) {
-            Eigen::MatrixXd pull = move_;
-            report_.factor = newton_.factorize(q_, load_parameters_, false, proximal_, pull, project_psd);
-            if (!report_.factor.succeeded) return fail(report_.factor.reason);
-            step = move_ + newton_.solve_with_factor(force - pull.col(0));
+            if (proximal_.motion && in_place && project_psd) {
+                if (!factorize_definite(true, shift_)) return false;
+                step = newton_.solve_with_factor(force);
+            } else {
+                Eigen::MatrixXd pull = move_;
+                report_.factor = newton_.factorize(q_, load_parameters_, false, proximal_, pull, project_psd);
+                if (!report_.factor.succeeded) return fail(report_.factor.reason);
+                if (proximal_.motion && in_place && report_.factor.negative_pivots > 0) continue;
+                step = move_ + newton_.solve_with_factor(force - pull.col(0));
+            }
             slope = force.dot(step);
             if (!in_place || slope > 0.0) break;
+            if (!project_psd && !newton_.is_unsymmetric()) continue;
+            // Friction that changes with the normal forces can turn a step uphill. The symmetric part of the matrix holds them.
+            if (proximal_.motion) step = newton_.solve_with_symmetric_part(force);
+            slope = force.dot(step);
+            if (slope > 0.0) break;
             if (project_psd) return fail("the energy does not fall along the step");
         }
         was_projected_ = project_psd;
@@ -291,8 +319,10 @@ class SearchedSteps final : public NewtonIteration {
         if (alpha_ < 0.0) return false;
         move_ = newton_.remaining_motion(move_, alpha_, q_, load_parameters_);
         evaluate();
-        // Near a saddle of the energy a projected matrix is far stiffer than the exact one, and its steps are too short.
-        const bool may_lengthen = project_psd && proximal_.motion && alpha_ == 1.0;
+        // Near a saddle of the energy a projected matrix is far stiffer than the exact one, and its steps are too short. Close to a
+        // solution with friction, which has no energy, longer steps may lead in circles.
+        const bool may_lengthen = project_psd && proximal_.motion && alpha_ == 1.0 &&
+                                  !(newton_.is_unsymmetric() && last_residual_ <= negligible_part);
         if (in_place)
             alpha_ *= newton_.line_search(
                 q_, load_parameters_, proximal_, from, step, alpha_ * slope,
@@ -300,9 +330,23 @@ class SearchedSteps final : public NewtonIteration {
         return true;
     }
 
+    // Returns false in a time stage whose least residual has not halved for long: its step is then taken in parts.
+    bool makes_progress() {
+        // Iterations in which it must halve; see test_a_stage_with_contact_wastes_few_factorizations.
+        constexpr int patience = 4 * few;
+        if (report_.residual <= progress_part * least_residual_) {
+            least_residual_ = report_.residual;
+            least_at_ = report_.iterations;
+        }
+        return !proximal_.motion || report_.iterations - least_at_ <= patience;
+    }
+
     VectorXd move_;  // what is left of the prescribed motion
     double last_residual_ = std::numeric_limits<double>::infinity(), alpha_ = 1.0;
+    double least_residual_ = std::numeric_limits<double>::infinity();
+    int least_at_ = 0;  // the iteration that had it
     bool was_projected_ = false;
+    double shift_ = 0.0;  // of the masses in the last projected matrix
 };
 
 }  // namespace

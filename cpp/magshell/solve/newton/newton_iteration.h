@@ -33,6 +33,10 @@ class NewtonIteration {
     /// Takes one step and evaluates its end. Returns false, with a reason in the report, if there is none.
     virtual bool step() = 0;
 
+    /// Factorizes at the current state of a time stage, with the masses in the matrix multiplied by 1 + shift, which is raised until all
+    /// pivots are positive. Returns false, with a reason in the report, if no shift does. The gradient stays that of the stage.
+    bool factorize_definite(bool project_psd, double& shift);
+
     void evaluate() { newton_.evaluate(q_, load_parameters_, proximal_); }
     bool fail(std::string reason) {
         report_.reason = std::move(reason);
