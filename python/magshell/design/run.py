@@ -18,7 +18,6 @@ from .configuration import as_stored, decoded, encoded
 from .jump_policies import checked_stateful, jumps_accepted, offering
 from .minimum import MinimizeResult, Record, conflict, effort_in_words, reason_of, total
 from .objective_value import Answer
-from .optim.sample import STAGNATION
 from .resume import check_objective, check_same
 
 if TYPE_CHECKING:
@@ -161,6 +160,8 @@ class Run:
     @property
     def stagnation(self) -> str:
         """The reason to give if a step changed nothing."""
+        from .optim.sample import STAGNATION  # imports torch
+
         return getattr(self.optimizer, "stagnation", STAGNATION)
 
     def minimum(self, reason: str) -> MinimizeResult | None:
