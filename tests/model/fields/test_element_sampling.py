@@ -8,6 +8,7 @@ import pytest
 from magnet_forces import VACUUM_PERMEABILITY, cuboid_force
 
 import magshell as ms
+from magshell.model.scene import field_sampling
 from magshell.model.scene.element_sampling import element_forces
 from magshell.model.scene.field_sampling import _sources
 from magshell.model.scene.fine_faces import fine_faces, having_fine_faces
@@ -109,6 +110,54 @@ def test_the_force_of_a_near_magnet_on_elements_is_right_to_1_percent_or_finer(m
     assert abs(off - 0.01) > 1e-4
     found = ms.forces(scene, rest).on_vertices.sum(axis=0)
     np.testing.assert_allclose(found, exact, rtol=0, atol=(1e-3 if off > 0.01 else 0.01) * size)
+
+
+# [m], [m], [T]: sizes and distance of two cuboids, the second one in the field of the first, and their polarization along z
+CUBES = ((0.01,) * 3, (0.01,) * 3), (0.0, 0.0, 0.02), 1.0
+CUBOIDS = ((0.02, 0.012, 0.006), (0.012, 0.02, 0.006)), (0.0, -0.004, 0.008), 0.38
+
+
+@pytest.mark.parametrize(
+    ("cuboids", "cells", "own", "fine"),
+    [
+        (CUBES, (2, 2, 2), 1.17e-2, 6e-8),
+        (CUBES, (4, 4, 4), 7.49e-4, 4e-9),
+        (CUBOIDS, (4, 7, 2), 2.77e-3, 4e-6),
+    ],
+)
+def test_force_of_a_magnet_on_a_cuboid_equals_the_closed_form(cuboids, cells, own, fine):
+    """Check linear elements; above a percent they sample finely on their own."""
+    (of_magnet, size), offset, polarization = cuboids
+    magnetization = (0, 0, polarization / VACUUM_PERMEABILITY)
+    exact = cuboid_force(of_magnet, size, offset, 2, polarization)
+    block = ms.Solid(
+        ms.meshes.box(size, cells=cells).transformed(translation=np.array(offset) - 0.5 * np.array(size)),
+        material=ms.NeoHookean(young_modulus=1e12, poisson_ratio=0.3),
+        element="linear",
+        remanent_magnetization=magnetization,
+    )
+    held = ms.Pin(block.mesh.vertices_at(x=block.mesh.rest_positions[:, 0].min()))
+    scene = ms.Scene(block, supports=[held], field=ms.CuboidMagnet(of_magnet, magnetization))
+    rest = scene.mesh.rest_positions
+    errors = [
+        np.linalg.norm(compared(scene, with_fine(scene, each), rest)[2] - exact) / np.linalg.norm(exact)
+        for each in (0.0, 1.0)
+    ]
+    assert errors[0] == pytest.approx(own, rel=0.05) and errors[1] < fine
+    by_itself = np.linalg.norm(ms.forces(scene, rest).on_vertices.sum(axis=0) - exact) / np.linalg.norm(exact)
+    assert by_itself == pytest.approx(errors[int(errors[0] > 0.01)], rel=0.01, abs=1e-9)
+
+
+def test_an_equilibrium_computes_the_errors_of_its_elements_at_the_start_and_at_the_end_only(monkeypatch):
+    states = []
+
+    def counted(values, positions, sources):
+        states.append(positions)
+        return element_forces(values, positions, sources)
+
+    monkeypatch.setattr(field_sampling, "element_forces", counted)
+    ms.equilibrium(small("linear"), progress=False)
+    assert len(states) == 2
 
 
 def small(kind, law="stretches", **options):

@@ -119,14 +119,12 @@ def warn_of_sampling(found: Iterable[SamplingError], where: str) -> None:
             )
 
 
-def warn_of_elements(
-    values: Values, positions: np.ndarray, field_factor: float, flux_density: Any, where: str
-) -> None:
+def warn_of_elements(found: Iterable[SamplingError], where: str) -> None:
     """Warn if the magnetic force on a six-node shell or a solid is off by more than 1 %, or if that cannot be told.
 
-    Arguments as for sampling_errors().
+    found: the errors of all bodies, by element_errors().
     """
-    for each in element_errors(values, positions, field_factor, flux_density):
+    for each in found:
         if each.error > TRUSTED:
             order = np.argsort(-np.nan_to_num(each.off), kind="stable")
             why, what_to_do = (

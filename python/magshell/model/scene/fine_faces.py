@@ -12,7 +12,7 @@ fine faces.
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -80,25 +80,33 @@ def with_fine_faces(
     return with_fine_faces_and_errors(inputs, state, load_parameters, estimate)[0]
 
 
+class Errors(NamedTuple):
+    """The errors of sampling in a state, of three-node faces and of elements; None if not computed."""
+
+    faces: list[SamplingError] | None = None
+    elements: list[SamplingError] | None = None
+
+
 def with_fine_faces_and_errors(
     inputs: Inputs, state: np.ndarray, load_parameters: np.ndarray, estimate: float | None = None
-) -> tuple[Inputs, list[SamplingError] | None]:
-    """Return what with_fine_faces() returns, and the errors of sampling in this state before; None if not computed."""
+) -> tuple[Inputs, Errors]:
+    """Return what with_fine_faces() returns, and the errors of sampling in this state before."""
     layout = inputs.scene._load_parameter_layout
     if not _keys(inputs.scene._value_layout):
-        return inputs, None
+        return inputs, Errors()
     positions = inputs.scene._model.positions(state)
     at = (
         positions,
         float(layout.of(load_parameters, "scene", "field_factor")[0]),
         layout.of(load_parameters, "scene", "applied_flux_density")[0],
     )
-    errors = None
-    if _are_faces_suspect(inputs, state, load_parameters, estimate):
-        errors = list(sampling_errors(inputs.values, *at))
-    found = [*(errors or ()), *element_errors(inputs.values, *at)]
+    suspect = _are_faces_suspect(inputs, state, load_parameters, estimate)
+    errors = Errors(
+        faces=list(sampling_errors(inputs.values, *at)) if suspect else None,
+        elements=list(element_errors(inputs.values, *at)),
+    )
     numbers = {}
-    for each in found:
+    for each in [*(errors.faces or ()), *errors.elements]:
         more = _faces_to_refine(each)
         if len(more):
             numbers[each.label, KEY] = each.fine.astype(np.float64)

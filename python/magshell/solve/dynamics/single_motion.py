@@ -17,7 +17,7 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.fields.magnets import describe_magnet_overlap
-from ...model.scene.field_sampling import sampling_errors, warn_of_elements, warn_of_sampling
+from ...model.scene.field_sampling import element_errors, sampling_errors, warn_of_elements, warn_of_sampling
 from ...model.scene.fine_faces import fine_faces
 from ...model.scene.replacements import requested
 from ...model.scene.reshaped import reshaped, turning_supports
@@ -270,7 +270,7 @@ def _warn_of_fields(result: Trajectory) -> None:
         None if flux_density is None else np.reshape(detached(flux_density), (-1, 3))[k],
     )
     warn_of_sampling(sampling_errors(*state), where)
-    warn_of_elements(*state, where)
+    warn_of_elements(element_errors(*state), where)
 
 
 def _requested_tangents(motion_inputs: MotionInputs) -> Sequence[np.ndarray] | None:

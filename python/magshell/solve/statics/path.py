@@ -26,7 +26,13 @@ from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.element_sampling import has_elements
-from ...model.scene.field_sampling import is_suspect, sampling_errors, warn_of_elements, warn_of_sampling
+from ...model.scene.field_sampling import (
+    element_errors,
+    is_suspect,
+    sampling_errors,
+    warn_of_elements,
+    warn_of_sampling,
+)
 from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
 from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
@@ -432,22 +438,22 @@ def _warn_of_fields(path: EquilibriumPath) -> None:
     errors = np.array([point.field_sampling_error for point in path._points])
     k = int(np.argmax(np.where(np.isnan(errors), np.inf, errors)))
     if is_suspect(errors[k]):
-        found = sampling_errors(
-            path._values_at(k),
-            path.positions[k],
-            float(path._load_parameter("field_factor")[k, 0]),
-            path._load_parameter("applied_flux_density")[k, 0],
-        )
+        found = sampling_errors(*_fields_at(path, k))
         warn_of_sampling(found, f"the path, at point {k}, parameter {path.parameters[k]:.4g}")
     if has_elements(path._values_at(0)):
         k = int(np.argmax(_magnetic_energies(path)))  # magnets are nearest there
-        warn_of_elements(
-            path._values_at(k),
-            path.positions[k],
-            float(path._load_parameter("field_factor")[k, 0]),
-            path._load_parameter("applied_flux_density")[k, 0],
-            f"the path, at point {k}, parameter {path.parameters[k]:.4g}",
-        )
+        found = element_errors(*_fields_at(path, k))
+        warn_of_elements(found, f"the path, at point {k}, parameter {path.parameters[k]:.4g}")
+
+
+def _fields_at(path: EquilibriumPath, k: int) -> tuple[Values, np.ndarray, float, np.ndarray]:
+    """Return the arguments of sampling_errors() and element_errors() for a point."""
+    return (
+        path._values_at(k),
+        path.positions[k],
+        float(path._load_parameter("field_factor")[k, 0]),
+        path._load_parameter("applied_flux_density")[k, 0],
+    )
 
 
 def _magnetic_energies(path: EquilibriumPath) -> np.ndarray:

@@ -20,13 +20,13 @@ from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.scene.field_sampling import (
-    SamplingError,
+    element_errors,
     is_suspect,
     sampling_errors,
     warn_of_elements,
     warn_of_sampling,
 )
-from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces, with_fine_faces_and_errors
+from ...model.scene.fine_faces import Errors, keeping_fine_faces, with_fine_faces, with_fine_faces_and_errors
 from ...model.scene.replacements import requested
 from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
@@ -212,12 +212,13 @@ def solve(
     layout = scene._load_parameter_layout
     field_factor = float(layout.of(found.load_parameters, "scene", "field_factor")[0])
     flux_density = layout.of(found.load_parameters, "scene", "applied_flux_density")[0]
+    at = (inputs.values, positions, field_factor, flux_density)
     try:  # Ctrl-C may arrive in a field that is a Python function of the caller
         if is_suspect(found.field_sampling_error):
-            if errors is None:
-                errors = sampling_errors(inputs.values, positions, field_factor, flux_density)
-            warn_of_sampling(errors, "this equilibrium")
-        warn_of_elements(inputs.values, positions, field_factor, flux_density, "this equilibrium")
+            of_faces = sampling_errors(*at) if errors.faces is None else errors.faces
+            warn_of_sampling(of_faces, "this equilibrium")
+        of_elements = element_errors(*at) if errors.elements is None else errors.elements
+        warn_of_elements(of_elements, "this equilibrium")
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Solution(result, found, inputs)
@@ -229,10 +230,10 @@ def _with_fine_faces_at_end(
     to: np.ndarray,
     options: _core.StaticsOptions,
     progress: Callable[[float, float], None] | None,
-) -> tuple[_core.StaticsResult, Inputs, list[SamplingError] | None, KeyboardInterrupt | None]:
+) -> tuple[_core.StaticsResult, Inputs, Errors, KeyboardInterrupt | None]:
     """Repeat the search with more faces that sample the field finely, until the state needs no more.
 
-    Returns the result, the inputs, the errors of sampling in the state that was found if they are known, and the
+    Returns the result, the inputs, the errors of sampling in the state that was found as far as they are known, and the
     KeyboardInterrupt that was raised meanwhile, or None.
     """
     for _ in range(_MOST_REFINEMENTS):
@@ -243,7 +244,7 @@ def _with_fine_faces_at_end(
                 inputs, found.state, found.load_parameters, found.field_sampling_error
             )
         except KeyboardInterrupt as stopped:
-            return found, inputs, None, stopped
+            return found, inputs, Errors(), stopped
         if finer is inputs:
             return found, inputs, errors, None
         options.start_at_rest = False
@@ -260,7 +261,7 @@ def _with_fine_faces_at_end(
             )
         again.add_effort_of(found)
         found, inputs = again, finer
-    return found, inputs, None, None
+    return found, inputs, Errors(), None
 
 
 def _energies(scene: Scene, found) -> dict[str, float] | None:
