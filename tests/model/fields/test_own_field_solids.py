@@ -129,11 +129,16 @@ def crumpled(element="linear", seed=0, accuracy=1e-6, law="stretches"):
     rng = np.random.default_rng(seed)
     cells = (2, 2, 1) if element == "linear" else (1, 1, 1)
     mesh = ms.meshes.rectangle(SIDE, SIDE, cells=(3, 3)).transformed(translation=(-4e-3, -6e-3, 6.5e-3))
-    shell = ms.Shell(mesh, thickness=5e-4, young_modulus=1e6)
+    shell = ms.Shell(mesh, thickness=5e-4, young_modulus=1e6, magnetization_law=law)
     solid = block((SIDE, SIDE, 0.6 * SIDE), cells, element=element, magnetization_law=law)
     solid = solid.replaced(remanent_magnetization=1e5 * rng.normal(size=(solid.mesh.n_tetrahedra, 3)))
     core = ms.meshes.box((SIDE, SIDE, SIDE), cells=cells).transformed(translation=(7e-3, 1e-3, -2e-3))
-    coat = ms.Skin(thickness=5e-4, faces=np.arange(6), remanent_magnetization=1e5 * rng.normal(size=(6, 3)))
+    coat = ms.Skin(
+        thickness=5e-4,
+        faces=np.arange(6),
+        remanent_magnetization=1e5 * rng.normal(size=(6, 3)),
+        magnetization_law=law,
+    )
     skinned = ms.Solid(core, material=RUBBER, element=element, skin=coat)
     scene = free_scene([shell, solid, skinned], accuracy=accuracy)
     rest = scene.mesh.rest_positions
