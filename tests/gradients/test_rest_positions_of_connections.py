@@ -375,13 +375,6 @@ def test_gradient_by_rest_positions_of_the_forces_of_a_foundation_agrees_with_di
     compare(loss, X, step=3e-6)
 
 
-def test_rest_positions_in_a_scene_with_an_own_field_are_refused():
-    scene, body, _ = carrying()
-    own = ms.Scene(body, supports=scene.supports, own_field=ms.OwnField())
-    with pytest.raises(ValueError, match="an OwnField"):
-        ms.equilibrium(own, values={body: {"rest_positions": X}})
-
-
 @pytest.mark.parametrize("moving", [False, True], ids=["at rest", "in motion"])
 def test_ball_on_a_rigid_part_at_other_rest_positions_touches_as_in_a_scene_made_so(moving):
     """Check that the ball stays where it was given at rest, and touches."""

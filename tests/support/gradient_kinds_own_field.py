@@ -114,15 +114,22 @@ def bodies_with_own_field(moves: bool) -> Kind:
     return Kind(scene, {"time_step": 4e-3, **inputs}, ms.simulate, fixed=fixed, reach=REACH)
 
 
-def stiff_pair(tip_load=(0.0, 0.0, 0.0), cells=(3, 1)) -> ms.Scene:
+def stiff_pair(tip_load=(0.0, 0.0, 0.0), cells=(3, 1), law="stretches") -> ms.Scene:
     """Build two clamped flaps above each other, of few degrees of freedom, so that eigenvalue problems take little time.
 
-    tip_load: N/m on the free end of each.
+    tip_load: N/m on the free end of each. law: of the magnetizations.
     """
     mesh = ms.meshes.rectangle(0.02, 0.006, cells=cells)
     meshes = [mesh, mesh.transformed(translation=(1e-3, 5e-4, 4e-3))]
     flaps = [
-        ms.Shell(each, thickness=4e-4, young_modulus=modulus, poisson_ratio=0.3, mass_density=2e3)
+        ms.Shell(
+            each,
+            thickness=4e-4,
+            young_modulus=modulus,
+            poisson_ratio=0.3,
+            mass_density=2e3,
+            magnetization_law=law,
+        )
         for each, modulus in zip(meshes, (4e8, 5e8), strict=True)
     ]
     supports = [

@@ -42,6 +42,9 @@
 
 namespace magshell {
 
+/// Returns the parts of three lengths in the derivative of the longest: equal ones where several are the longest.
+std::array<double, 3> parts_of_longest(const std::array<double, 3>& lengths);
+
 class OwnField {
   public:
     /// The faces of all sheets: their nodes, their corners at rest [m], and whether their tangential magnetization rotates without
@@ -68,12 +71,24 @@ class OwnField {
     struct DipoleWeights {
         std::array<double, 4> position{}, moment{};
     };
+    /// The gradient with respect to a triangle of a solid at rest, with its charge while the magnetizations that stretch stay.
+    struct TriangleGradient {
+        double charge, length;     // [J/(A m)]; by the longest side [N]
+        Vec3 area = Vec3::Zero();  // through magnetizations that rotate, by the area vector [N/m]
+        double volume = 0.0;       // through these, by the volume between the triangle and the origin [N/m2]
+    };
+    /// The gradient with respect to the shape at rest: the corners of each face [N], and the triangles.
+    struct RestGradient {
+        std::vector<std::array<Vec3, 3>> corners;
+        std::vector<TriangleGradient> triangles;
+    };
     /// The gradient with respect to the values of each face and of each tetrahedron, and to the weights of each dipole.
     struct FaceGradient {
         std::vector<Vec3> magnetization;  // [J m/A]
         std::vector<double> thickness;    // [J/m]
         std::vector<Vec3> of_tetrahedra;  // by the magnetization [J m/A]
         std::vector<DipoleWeights> of_dipoles;
+        RestGradient rest;
     };
     /// Trees of the source points, and the pairs of boxes whose sums they replace.
     struct Trees;
@@ -180,7 +195,7 @@ class OwnField {
     template <class T>
     struct ElementAdjoint {
         Triple<T> nodes[3], normal;
-        T charge{}, current{}, thickness{};
+        T charge{}, current{}, thickness{}, length{};
 
         ElementAdjoint& operator+=(const ElementAdjoint& other);
         ElementAdjoint& operator-=(const ElementAdjoint& other);
@@ -189,7 +204,7 @@ class OwnField {
     template <class T>
     struct FaceAdjoint {
         Triple<T> corners[3], normal;
-        T current{}, charge{}, thickness{};
+        T current{}, charge{}, thickness{}, size{};
 
         FaceAdjoint& operator+=(const FaceAdjoint& other);
         void scale(const T& factor);
@@ -257,6 +272,10 @@ class OwnField {
     void add_dipoles(const Geometry<T>& at, Targets targets, Evaluation<T>& out) const;
     template <class T>
     void add_self(const Geometry<T>& at, Index element, ElementAdjoint<T>& out) const;
+    /// Returns the derivatives by the corners of a face at rest. by_current: that by h_f (M~_f . n~_f) A~_f, over A_f.
+    std::array<Vec3, 3> by_corners(const Geometry<Dual>& at, Index face, const Evaluation<Dual>& found,
+                                   double by_current) const;
+    std::vector<TriangleGradient> by_triangles(const Geometry<Dual>& at, const Evaluation<Dual>& found) const;
     /// Adds the derivatives by the charges of tetrahedra whose magnetization rotates to those by the nodes of elements.
     template <class T>
     void collect_charges(const Geometry<T>& at, Evaluation<T>& out) const;

@@ -61,6 +61,12 @@ inline BlendWeight blend(const Blend& range, double t) {
             60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (width * width)};
 }
 
+// Returns the parts of two sizes in the derivative of the larger one: halves where they are the same.
+inline std::array<double, 2> parts_of_larger(double first, double second) {
+    if (std::abs(first - second) <= 1e-12 * std::max(first, second)) return {0.5, 0.5};
+    return first > second ? std::array<double, 2>{1.0, 0.0} : std::array<double, 2>{0.0, 1.0};
+}
+
 // Converts the weight and its slope to the type of t: a double, or a dual number.
 inline void lift(const BlendWeight& weight, double, double& value, double& slope) {
     value = weight.value;
@@ -262,7 +268,7 @@ template <class T>
 OwnField::ElementAdjoint<T>& OwnField::ElementAdjoint<T>::operator+=(const ElementAdjoint& other) {
     for (int k = 0; k < 3; ++k) nodes[k] += other.nodes[k];
     normal += other.normal;
-    charge += other.charge, current += other.current, thickness += other.thickness;
+    charge += other.charge, current += other.current, thickness += other.thickness, length += other.length;
     return *this;
 }
 
@@ -270,7 +276,7 @@ template <class T>
 OwnField::ElementAdjoint<T>& OwnField::ElementAdjoint<T>::operator-=(const ElementAdjoint& other) {
     for (int k = 0; k < 3; ++k) nodes[k] -= other.nodes[k];
     normal -= other.normal;
-    charge -= other.charge, current -= other.current, thickness -= other.thickness;
+    charge -= other.charge, current -= other.current, thickness -= other.thickness, length -= other.length;
     return *this;
 }
 
@@ -278,14 +284,15 @@ template <class T>
 void OwnField::ElementAdjoint<T>::scale(const T& factor) {
     for (Triple<T>& node : nodes) node = factor * node;
     normal = factor * normal;
-    charge = factor * charge, current = factor * current, thickness = factor * thickness;
+    charge = factor * charge, current = factor * current, thickness = factor * thickness,
+    length = factor * length;
 }
 
 template <class T>
 OwnField::FaceAdjoint<T>& OwnField::FaceAdjoint<T>::operator+=(const FaceAdjoint& other) {
     for (int k = 0; k < 3; ++k) corners[k] += other.corners[k];
     normal += other.normal;
-    current += other.current, charge += other.charge, thickness += other.thickness;
+    current += other.current, charge += other.charge, thickness += other.thickness, size += other.size;
     return *this;
 }
 
@@ -293,7 +300,8 @@ template <class T>
 void OwnField::FaceAdjoint<T>::scale(const T& factor) {
     for (Triple<T>& corner : corners) corner = factor * corner;
     normal = factor * normal;
-    current = factor * current, charge = factor * charge, thickness = factor * thickness;
+    current = factor * current, charge = factor * charge, thickness = factor * thickness,
+    size = factor * size;
 }
 
 /// Trees over the coarse points of the target elements and over the charged sides of the target faces, in the order of `element_order_` and

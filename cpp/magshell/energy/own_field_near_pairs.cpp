@@ -79,6 +79,8 @@ void OwnField::add_near_pairs(const Geometry<T>& at, const Neighbours& near, Tar
         const T product = at.charges[numbers[0]] * at.charges[numbers[1]] - currents[0] * currents[1] * along;
         const T by_mean = T(strength) * weight * product;
         const Triple<T> by_middle = (product * value * slope / (distance * longer)) * apart;
+        const T by_longer = -product * value * slope * distance / (longer * longer);
+        const std::array<double, 2> parts = parts_of_larger(elements[0]->length, elements[1]->length);
         for (int side = 0; side < 2; ++side) {
             ElementAdjoint<T>& adjoint = adjoints[side];
             const int other = 1 - side;
@@ -86,6 +88,7 @@ void OwnField::add_near_pairs(const Geometry<T>& at, const Neighbours& near, Tar
                 adjoint.nodes[k] += by_mean * mean.by_node(side, k);
             at.add_by_middle(*elements[side], side == 0 ? by_middle : -by_middle, adjoint);
             adjoint.charge += scaled * at.charges[numbers[other]];
+            adjoint.length += T(parts[side]) * by_longer;
             if (!elements[side]->is_edge()) continue;
             const Triple<T> by_level = by_mean * mean.by_level(side);
             adjoint.normal += T(element_thickness_[numbers[side]]) * by_level;

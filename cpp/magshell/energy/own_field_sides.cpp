@@ -163,8 +163,12 @@ void OwnField::add_near_side(const Geometry<T>& at, Index e, Index f, ElementAdj
     lift(meet ? BlendWeight{1.0, 0.0, 0.0} : blend(of_sides, value_of(distance) / value_of(longer)),
          distance / longer, weight, slope);
     const Triple<T> by_middle = (charge * element_change.charge * slope / (distance * longer)) * apart;
+    const T by_longer = -charge * element_change.charge * slope * distance / (longer * longer);
+    const std::array<double, 2> parts = parts_of_larger(element.length, face.size);
     element_change.scale(weight);
     face_change.scale(weight);
+    element_change.length += T(parts[0]) * by_longer;
+    face_change.size += T(parts[1]) * by_longer;
     at.add_by_middle(element, by_middle, element_change);
     for (Triple<T>& corner : face_change.corners) corner -= T(1.0 / 3.0) * by_middle;
     of_element += element_change;

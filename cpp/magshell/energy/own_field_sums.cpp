@@ -192,9 +192,11 @@ OwnField::FaceGradient OwnField::vjp(const double* q, const double* lambda) cons
     const Index n_faces = static_cast<Index>(faces_.size());
     const Evaluation<Dual> found =
         evaluate(positions<Dual>(q, lambda), neighbours(q, Targets::all), Targets::all);
-    FaceGradient by{std::vector<Vec3>(faces_.size(), Vec3::Zero()), std::vector<double>(faces_.size(), 0.0),
+    FaceGradient by{std::vector<Vec3>(faces_.size(), Vec3::Zero()),
+                    std::vector<double>(faces_.size(), 0.0),
                     std::vector<Vec3>(n_tetrahedra_, Vec3::Zero()),
-                    std::vector<DipoleWeights>(dipoles_.size())};
+                    std::vector<DipoleWeights>(dipoles_.size()),
+                    {}};
     const std::vector<Triple<Dual>> x = positions<Dual>(q, lambda);
     const Geometry<Dual> at(*this, x);
     for (Index f = 0; f < n_faces; ++f) {
@@ -206,6 +208,7 @@ OwnField::FaceGradient OwnField::vjp(const double* q, const double* lambda) cons
         by.magnetization[f] +=
             (thickness_[f] * by_rest_current + face.area * rate_of(adjoint.charge)) * face.normal;
         by.thickness[f] += along * by_rest_current + rate_of(adjoint.thickness);
+        by.rest.corners.push_back(by_corners(at, f, found, by_rest_current / face.area));
         if (face.rotates) {
             const UnstretchedVector<Dual> unstretched = at.unstretched(face);
             const std::array<Dual, 2> pull = unstretched(at.by_charges(face, found.elements));
@@ -237,6 +240,7 @@ OwnField::FaceGradient OwnField::vjp(const double* q, const double* lambda) cons
                 by.of_tetrahedra[element.bodies[side]] +=
                     (element.turns[side] * rate_of(found.elements[e].charge)) * element.area;
     }
+    by.rest.triangles = by_triangles(at, found);
     for (std::size_t d = 0; d < dipoles_.size(); ++d)
         for (int k = 0; k < 4; ++k) {
             const Triple<Dual>& corner = at.x[dipoles_[d].nodes[k]];

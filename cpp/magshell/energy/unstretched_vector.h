@@ -50,6 +50,9 @@ class UnstretchedVector {
                 T(inverse_[2]) * by_first + T(inverse_[3]) * by_second};
     }
 
+    /// Returns a column of F.
+    const Triple<T>& column(int c) const { return c == 0 ? first_ : second_; }
+
   private:
     std::array<double, 4> inverse_;
     Triple<T> first_, second_;  // the columns of F

@@ -172,7 +172,8 @@ std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
 void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                        Gradient& out) {
     const double factor = load_parameters[factor_.first];
-    const OwnField::FaceGradient by = field_.vjp(q, lambda);
+    OwnField::FaceGradient by = field_.vjp(q, lambda);
+    by_rest_ = std::move(by.rest);
     std::size_t triangle = 0;
     for (std::size_t k = 0; k < sheets_.size(); ++k)
         for (Index t = 0; t < sheets_[k].n_triangles(); ++t, ++triangle) {
@@ -193,6 +194,39 @@ void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, c
     for (std::size_t k = 0; k < state->by_position.size(); ++k)
         out.load_parameters[factor_.first] +=
             state->by_position[k].dot(Eigen::Map<const Vec3>(lambda + 3 * sources_->nodes()[k]));
+}
+
+void OwnFieldTerm::add_rest_vjp(const double*, const LoadParameters& load_parameters, const double*,
+                                VectorXd& out) {
+    const double factor = load_parameters[factor_.first];
+    const OwnField::Faces faces = triangles_of(sheets_);
+    for (std::size_t f = 0; f < faces.nodes.size(); ++f)
+        for (int i = 0; i < 3; ++i) out.segment<3>(3 * faces.nodes[f][i]) += factor * by_rest_.corners[f][i];
+    add_triangles_rest_vjp(factor, out);
+}
+
+// Q = a . (M_1 - M_2) with the area vector a at rest, of magnetizations that stretch.
+void OwnFieldTerm::add_triangles_rest_vjp(double factor, VectorXd& out) const {
+    const OwnField::Triangles triangles = triangles_of(solids_);
+    const auto stretching = [&](Index t) -> Vec3 {
+        return t < 0 || triangles.rotates[t] ? Vec3::Zero() : of_tetrahedra_[t];
+    };
+    for (std::size_t t = 0; t < triangles.nodes.size(); ++t) {
+        const std::array<Vec3, 3>& x = triangles.rest[t];
+        const auto& [first, second] = triangles.tetrahedra[t];
+        const OwnField::TriangleGradient& by = by_rest_.triangles[t];
+        const Vec3 by_area = by.charge * (stretching(first) - stretching(second)) + by.area;
+        std::array<double, 3> lengths;
+        for (int i = 0; i < 3; ++i) lengths[i] = (x[(i + 1) % 3] - x[i]).norm();
+        const std::array<double, 3> longest = parts_of_longest(lengths);
+        for (int i = 0; i < 3; ++i) {
+            const Vec3 &next = x[(i + 1) % 3], last = x[(i + 2) % 3];
+            const Vec3 pull = by.length * longest[i] * (next - x[i]).normalized();
+            out.segment<3>(3 * triangles.nodes[t][i]) +=
+                factor * (0.5 * by_area.cross(last - next) + by.volume / 6.0 * next.cross(last) - pull);
+            out.segment<3>(3 * triangles.nodes[t][(i + 1) % 3]) += factor * pull;
+        }
+    }
 }
 
 }  // namespace magshell

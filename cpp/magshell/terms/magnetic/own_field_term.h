@@ -8,10 +8,11 @@
 #include "magshell/terms/magnetic/sheet_triangles.h"
 #include "magshell/terms/magnetic/solid_triangles.h"
 #include "magshell/terms/operator_term.h"
+#include "magshell/terms/rest_shape_term.h"
 
 namespace magshell {
 
-class OwnFieldTerm final : public OperatorTerm {
+class OwnFieldTerm final : public OperatorTerm, public RestShapeTerm {
   public:
     /// A rigid body with a moment, and all of its nodes, first the corners of its tetrahedron.
     struct Magnet {
@@ -37,6 +38,8 @@ class OwnFieldTerm final : public OperatorTerm {
     bool add_projective_stiffness(NodeMatrix&) const override { return false; }
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void add_rest_vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
+                      VectorXd& out) override;
     std::size_t bytes() const override { return field_.bytes() + sources_->bytes(); }
 
     /// Returns the own field of the present values.
@@ -55,6 +58,8 @@ class OwnFieldTerm final : public OperatorTerm {
     };
     /// Returns the own field at q, which is kept until it is asked for at another state.
     std::shared_ptr<const State> state_at(const double* q) const;
+    /// Adds the derivatives by the corners of the triangles of solids at rest.
+    void add_triangles_rest_vjp(double factor, VectorXd& out) const;
 
     const std::vector<SheetTriangles> sheets_;
     const std::vector<MagnetizedSolid> solids_;
@@ -72,6 +77,7 @@ class OwnFieldTerm final : public OperatorTerm {
     std::shared_ptr<const OwnField>
         sources_;  // of the elements with a source; shared with the Hessians of earlier solves, so it is replaced, never changed
     mutable std::shared_ptr<const State> state_;
+    OwnField::RestGradient by_rest_;  // of the last vjp()
 };
 
 }  // namespace magshell

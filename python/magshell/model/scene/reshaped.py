@@ -47,17 +47,11 @@ def reshaped(scene: Scene, values: Any, no_gradient_with: Sequence[str] = ()) ->
     no_gradient_with: words for what has no derivative by rest positions in this kind of solve only.
 
     Without rest_positions among the values, both are returned unchanged. Raises ValueError for rest positions that do
-    not fit, or in a scene with an OwnField; NoGradient if a gradient by them is asked for and
-    something in the scene has none.
+    not fit; NoGradient if a gradient by them is asked for and something in the scene has none.
     """
     given = _rest_positions(scene, values)
     if not given:
         return scene, values
-    if scene.own_field:
-        raise ValueError(
-            f"{REST} cannot be replaced in a scene with an OwnField yet: make the scene anew from a mesh with these rest "
-            "positions"
-        )
     numbers = {body: _numbers(body, value) for body, value in given.items()}
     there = _made(scene, numbers)
     if any(requires_gradient(value) for value in given.values()):
@@ -198,6 +192,7 @@ def _with_rest(
         name: tuple(map(stand_in, each)) if isinstance(each, tuple) else each
         for name, each in Scene.__getstate__(scene).items()
     }
+    arguments["own_field"] = _about(scene.own_field, now)  # which names bodies, links among them
     there = ReshapedScene.__new__(ReshapedScene)  # whose __init__ reads the attributes that follow
     remember(there, _numbered_like=numbered_like, _rigid_like=scene)
     there.__init__(**{**arguments, "allow_rigid_motions": True})
