@@ -57,7 +57,7 @@ def by_rest_positions(inputs: Inputs, body: Shell | Solid, gradient: Gradient) -
     values, scene = inputs.values, inputs.scene
     span = scene._bodies.spans[scene._bodies.number(body)]
     shape = AtNodes(*gradient.rest)
-    found = shape.vertices[span.vertices]
+    found = shape.vertices[span.vertices].copy()  # adjoints keep their gradients
     found += _through_directions(values, span, shape.directions)
     found += _through_moves(values, span, gradient)
     found += _through_contacts(values, body, gradient)
