@@ -88,7 +88,8 @@ def ball_on_a_sheet_at_rest() -> Kind:
         gravity=(0.1, 0.2, -2.0),
     )
     reach = {**REACH, **PLACE, "rest_positions": 0.02}
-    return Kind(scene, {"gravity_factor": 0.9}, fixed=EXACT, step=5e-5, reach=reach)
+    # Membranes are stiff and bending is soft, so that round-off of the forces moves equilibria by up to 3e-11 m.
+    return Kind(scene, {"gravity_factor": 0.9}, fixed=EXACT, step=4e-4, reach=reach)
 
 
 def thrown_onto_a_moving_ellipsoid() -> Kind:

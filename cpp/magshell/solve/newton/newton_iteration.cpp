@@ -27,11 +27,10 @@ NewtonReport NewtonIteration::run() {
 }
 
 bool NewtonIteration::factorize_definite(bool project_psd, double& shift) {
-    // Factor by which the shift is raised and lowered, and the largest shift [-]; see test_a_rolling_sheet_takes_whole_steps.
-    constexpr double shift_factor = 4.0, largest_shift = 1e12;
+    constexpr double largest_shift = 1.0 / energy_tolerance;  // see test_a_rolling_sheet_takes_whole_steps
     Eigen::MatrixXd no_moves(q_.size(), 0);
-    shift = shift > 1.0 ? shift / shift_factor : 0.0;
-    for (; shift <= largest_shift; shift = std::max(1.0, shift_factor * shift)) {
+    shift = shift > 1.0 ? shift / large_factor : 0.0;
+    for (; shift <= largest_shift; shift = std::max(1.0, large_factor * shift)) {
         // The target moves with the weights so that the gradient at q does not change.
         const VectorXd weights = (1.0 + shift) * *proximal_.weights,
                        target = q_ - (q_ - *proximal_.target) / (1.0 + shift);
