@@ -161,7 +161,8 @@ class _Direction:
                 :, None
             ]
 
-        rates = directional_derivative(at, steps_along(inputs, leaf, change), sizes=self._sizes(len(at(0.0))))
+        sizes = self._sizes(n_values + n_masses + self._own_velocities(inputs.values).size)
+        rates = directional_derivative(at, steps_along(inputs, leaf, change), sizes=sizes)
         if rates is None:
             raise NoGradient(
                 f"no tangent by {leaf.name}: the scene is not smooth in it, or it is at the end of its range; {_ADVICE}"
