@@ -16,6 +16,7 @@ CELLS, QUICK_CELLS = ((48, 8), (128, 32)), ((6, 2),)
 TIME_STEP, STEPS, QUICK_STEPS = 1e-3, 100, 20
 ALLOWED = 2.5  # [-] largest time of a step over one without contact
 EXACT = "contact, friction"
+EULER = ms.ImplicitEuler()
 SURROUNDINGS: dict[
     str, tuple[dict[str, Any] | None, bool]
 ] = {  # (friction in keywords for ms.Contact, or None without contact; whether in water)
@@ -81,7 +82,9 @@ def measure(rounds: int, quick: bool) -> dict[str, Any]:
     return results
 
 
-def _motion(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
+def _motion(
+    scene: ms.Scene, steps: int, rounds: int, integrator: ms.ImplicitEuler | None = EULER
+) -> dict[str, Any]:
     best = np.inf
     for _ in range(rounds):
         began = time.process_time()
@@ -91,7 +94,7 @@ def _motion(scene: ms.Scene, steps: int, rounds: int) -> dict[str, Any]:
             time_step=TIME_STEP,
             remanent_magnetization=(2e4, 0, 1e3),
             applied_flux_density=lambda t: (5e-3 * np.cos(20 * t), 0, 5e-3 * np.sin(20 * t)),
-            integrator=ms.ImplicitEuler(),
+            integrator=integrator,
             record_every=steps,
             progress=False,
         )

@@ -17,7 +17,7 @@ import magshell as ms
 from benchmarks.cases import cylinder_roof, shear_strip
 from benchmarks.cases.solids import SOLID_CASES, bent_beam
 from benchmarks.statics import CASES, strongly_bent
-from benchmarks.surrounding_costs import SURROUNDINGS, TIME_STEP, falling
+from benchmarks.surrounding_costs import EXACT, SURROUNDINGS, TIME_STEP, falling
 
 STEPS = 100  # time steps of the sheet of 768 faces that falls on a floor
 
@@ -68,7 +68,11 @@ def _snap() -> float:
 def _falling() -> dict[str, float]:
     """Count the factorizations and iterations per step of a sheet that falls on a floor."""
     found = {}
-    for name, each in SURROUNDINGS.items():
+    cases = [(name, each, ms.ImplicitEuler()) for name, each in SURROUNDINGS.items()]
+    for name, each, integrator in [
+        *cases,
+        (f"{EXACT}, by default", SURROUNDINGS[EXACT], None),
+    ]:
         move = ms.simulate(
             falling((48, 8), *each),
             steps=STEPS,
@@ -79,7 +83,7 @@ def _falling() -> dict[str, float]:
                 0,
                 5e-3 * np.sin(20 * t),
             ),
-            integrator=ms.ImplicitEuler(),
+            integrator=integrator,
             record_every=STEPS,
             progress=False,
         )

@@ -61,7 +61,13 @@ class Scenery:
         velocities = np.zeros((self.scene.mesh.n_vertices, 3))
         velocities[: self.ball.mesh.n_vertices] = throw.velocity
         return ms.simulate(
-            self.scene, steps=steps, time_step=TIME_STEP, velocities=velocities, progress=False, **options
+            self.scene,
+            steps=steps,
+            time_step=TIME_STEP,
+            velocities=velocities,
+            integrator=ms.ImplicitEuler(),  # as in the paper's code
+            progress=False,
+            **options,
         )
 
 

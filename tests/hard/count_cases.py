@@ -78,6 +78,12 @@ def _motions() -> Iterator[Counted]:
             name,
             lambda e=each: surrounding_costs._motion(surrounding_costs.falling((12, 3), *e), 40, 1),
         )
+        if each[0] is not None:
+            yield (
+                "surroundings, by default",
+                name,
+                lambda e=each: surrounding_costs._motion(surrounding_costs.falling((12, 3), *e), 40, 1, None),
+            )
     for touching in (True, False):
         yield (
             "thrown bars",

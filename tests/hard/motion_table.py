@@ -1,4 +1,4 @@
-"""Prints what motions with contact reach by the default integrator and by TR-BDF2 with implicit contact, in one table.
+"""Prints what motions with contact reach by implicit Euler and by TR-BDF2 with implicit contact, the default, in one table.
 
 PYTHONPATH=.:tests/hard:tests/support python tests/hard/motion_table.py [SCENES]
 

@@ -152,7 +152,9 @@ def test_a_ball_on_a_sheet_of_another_fineness(ball_cells, sheet_cells):
         allow_rigid_motions=True,
     )
     motion = moved(scene, 6, 1e-3, velocities=of_body(scene, ball, (0.0, 0.0, -1.0)))
-    assert len(motion.contact_state(touch).pairs) and motion[floor].positions[-1][:, 2].min() < -1e-3
+    # The coarse sheet runs ahead of the ball after the impact.
+    touched = sum(len(motion.contact_state(touch, k).pairs) > 0 for k in range(len(motion)))
+    assert touched >= 3 and motion[floor].positions[-1][:, 2].min() < -1e-3
 
 
 @pytest.mark.parametrize("law", ["barrier", "penalty"])

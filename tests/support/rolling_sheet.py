@@ -51,7 +51,7 @@ def rolling_sheet(
         scene,
         steps=steps,
         time_step=time_step,
-        integrator=integrator or ms.ImplicitEuler(),
+        integrator=integrator,
         stiffness_damping=2e-3,
         applied_flux_density=field,
     )
@@ -86,7 +86,7 @@ def main() -> None:
         return
     if sys.argv[1:] == ["adaptive"]:
         for tolerance in (1e-4, 3e-5, 1e-5, None):
-            move = rolling_sheet(ms.Adaptive(8e-3, tolerance))
+            move = rolling_sheet(ms.Adaptive(8e-3, tolerance), integrator=ms.ImplicitEuler())
             print(
                 f"{tolerance or 'default'}: {move.factorizations} factorizations, {len(move.time_steps)} steps of "
                 f"{move.time_steps.min():.2g} to {move.time_steps.max():.2g} s, {travel(move):.9f} mm",

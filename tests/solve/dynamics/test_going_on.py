@@ -9,6 +9,7 @@ import magshell as ms
 
 MESH = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2), irregular=0.2, seed=1)
 INTEGRATORS = (ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3())
+IMPLICIT = ms.TRBDF2(implicit_contact=True)
 STEPS, FIRST = 20, 7
 TIME_STEP = 7e-4  # no sum of it is exact
 
@@ -85,8 +86,14 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda each: type(each).__name__)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind, integrator",
+    [
+        *[(kind, each) for each in INTEGRATORS for kind in KINDS],
+        *[(kind, IMPLICIT) for kind in ("contact", "friction", "lagged friction")],
+    ],
+    ids=repr,
+)
 def test_functions_of_the_time_go_on(kind, integrator):
     make, options = KINDS[kind]
     scene, options = make(), {"integrator": integrator, **options}

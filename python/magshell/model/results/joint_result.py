@@ -181,5 +181,5 @@ def _unwrapped(angle):
     """Return angles unwrapped over the first axis, if there is one."""
     if angle.ndim == 0:
         return angle
-    numbers = angle if isinstance(angle, np.ndarray) else angle.detach().numpy()
+    numbers = detached(angle)
     return angle + as_operand(np.unwrap(numbers, axis=0) - numbers, angle)

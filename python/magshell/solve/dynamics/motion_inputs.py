@@ -14,7 +14,6 @@ from ..._input.quantity import quantity
 from ..._input.tensors import detached, is_tensor, requires_gradient
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ...model.contact.contacts_to_core import check_outside, poses
-from ...model.contact.obstacles import Attached
 from ...model.contact.watched_obstacles import watched_obstacles
 from ...model.fields.field import AppliedField
 from ...model.rigid.equimomental_points import check_joints, check_rigid, own_velocities
@@ -24,6 +23,7 @@ from ...model.scene.solve_inputs import Inputs, check_flux_density
 from ..options import Adaptive, Clock, Integrator, Newton, clock_of
 from ..statics.equilibrium import Equilibrium
 from ..statics.start import check_faces
+from .contact_method import check_contact_method, default_integrator
 from .differentiable_state import DifferentiableState
 from .schedule import Schedule
 from .scheduled_values import ScheduledValues
@@ -67,12 +67,14 @@ class MotionInputs:
         record_every: int,
         adjoint_storage: AdjointStorage,
         start: Any,
-        integrator: Integrator,
+        integrator: Integrator | None,
         solver: Newton,
         schedules: Iterable[Schedule] = (),
         chosen: list[float] | None = None,
         fine_faces_of: Values | None = None,
     ):
+        integrator = default_integrator(inputs) if integrator is None else integrator
+        check_contact_method(inputs, integrator)
         self.inputs, self.integrator, self.solver = inputs, integrator, solver
         self.steps, self.record_every = count("steps", steps), count("record_every", record_every)
         if self.record_every > self.steps:
@@ -80,7 +82,6 @@ class MotionInputs:
                 f"record_every must be at most steps = {self.steps}, got {self.record_every}: "
                 "only the start would be recorded"
             )
-        _check_contact_method(inputs, integrator)
         given = arguments["time_step"]
         adaptive = given if isinstance(given, Adaptive) else None
         _check_memory(self.steps, self.record_every, len(integrator._times) + 1, inputs.scene._model.size)
@@ -458,24 +459,6 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
     if not isinstance(start.clock, Clock | None):
         raise ValueError(f"start.clock must be that of a motion, or None, got {type(start.clock).__name__}")
     return start
-
-
-def _check_contact_method(inputs: Inputs, integrator: Integrator) -> None:
-    """Raise ValueError if an integrator cannot treat the contact of a motion as it is asked to."""
-    scene = inputs.scene
-    attached = [each for each in scene.obstacles if isinstance(each, Attached)]
-    if attached and getattr(integrator, "_projective", None) is not None:
-        raise ValueError(
-            f"ms.ProjectiveDynamics does not take an obstacle that a body carries: {attached[0]!r:.80}"
-        )
-    if not getattr(integrator, "implicit_contact", False) or not scene.contacts or scene.water is None:
-        return
-    added_mass = float(detached(inputs.values.current(scene.water).added_mass))
-    if added_mass > 0.0:
-        raise ValueError(
-            "TRBDF2(implicit_contact=True) needs water without added mass, which contact forces would accelerate as "
-            f"well; the water has added_mass = {added_mass:g} kg/m2. Take TRBDF2() or ImplicitEuler()"
-        )
 
 
 def _differentiable_in_time(numbers, time_step) -> bool:

@@ -135,9 +135,9 @@ def simulate(
         between which values (rotation vectors too) are interpolated linearly, at the stages of a step as well. Field
         sources may be given per step, (steps, ...), and then jump. For friction, the velocity of an obstacle at the end
         of a step is that of a parabola through three neighbouring ends, interpolated linearly between them.
-    integrator: TRBDF2() by default, ImplicitEuler() if the scene has contacts; SDIRK2(), SDIRK3(), ProjectiveDynamics().
-        With a method of higher order bodies rebound, but a step through an impact is much work unless the steps resolve the
-        impact. TRBDF2(implicit_contact=True) rebounds correctly where they do, and loses energy where they do not.
+    integrator: TRBDF2() by default; TRBDF2(implicit_contact=True) if the scene has contacts, with which bodies rebound
+        correctly where the steps resolve the impact and lose energy where they do not; ImplicitEuler() if it has contacts
+        and water with added mass, which implicit contact does not support. Others: SDIRK2(), SDIRK3(), ProjectiveDynamics().
     record_every: the number of steps (or intervals) between recorded states. The start is recorded too.
     adjoint_storage: what is stored for gradients: "stages" (all states), "checkpoints", "factors", or an ms.AdjointStorage,
         which also limits the bytes. By default all states if they fit into 2 GB, else checkpoints.

@@ -33,10 +33,8 @@ from ..options import (
     DEFAULT_SOLVER,
     SDIRK2,
     SDIRK3,
-    TRBDF2,
     Adaptive,
     AdjointStorage,
-    ImplicitEuler,
     Integrator,
     Newton,
     ProjectiveDynamics,
@@ -104,8 +102,6 @@ def preparation(
     )
     replaced, schedules = split_schedules(scene, replaced)
     uniform = np.zeros(3) if scene.has_uniform_field else None
-    if integrator is None:
-        integrator = ImplicitEuler() if scene.contacts else TRBDF2()
     held = [
         part for part in scene.rigid_parts if part.vertices is not None or scene._bodies.skeleton_of(part)
     ]

@@ -344,11 +344,12 @@ class Trajectory(AnimateMixin, OfOneBody):
         crossings = describe_self_intersections(self.scene.mesh, detached(self.positions))
         taken = len(self.time_steps)
         a_step = 1e3 * self.wall_time / max(taken, 1)
+        method = repr(self.integrator).removesuffix("()")
         if taken > self.steps:
             halved = f" in {taken}{halved}"
         return (
             f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
-            f"{type(self.integrator).__name__}\n"
+            f"{method}\n"
             f"  {describe_steps(self)}\n"
             f"  {describe_strains(self, strain)}\n"
             f"  {crossings}\n"
