@@ -1,5 +1,7 @@
 """The integrator of a motion for which none is given: which one it is, and that everything composes with it."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,30 @@ def test_members_of_a_batch_have_the_bits_of_single_motions():
         alone = thrown(scene, values={FLOOR: {"friction_coefficient": friction[k]}})
         np.testing.assert_array_equal(batch.positions[k], alone.positions)
     assert np.abs(batch.positions[0] - batch.positions[1]).max() > 1e-6
+
+
+def test_a_warning_of_an_impact_names_steps_that_would_do():
+    """Let a strip fall onto the floor as in docs/how-to/time-steps.md: the error of an impact is of first order."""
+    mesh = ms.meshes.rectangle(0.03, 6e-3, cells=(12, 3)).transformed(translation=(0, 0, 1e-3))
+    strip = ms.Shell(
+        mesh, thickness=5e-4, young_modulus=5e5, mass_density=2e3, remanent_magnetization=(4e4, 0, 0)
+    )
+    scene = ms.Scene(
+        strip,
+        supports=[ms.Pin(mesh.vertices_at(x=0.0))],
+        contacts=[ms.Contact(ms.obstacles.Plane(), friction_coefficient=0.4)],
+        field=ms.UniformField(),
+        gravity=(0, 0, -9.81),
+        allow_rigid_motions=True,
+    )
+    lifting = {"applied_flux_density": lambda t: (0.0, 0.0, 2e-2 * np.sin(np.pi * min(t / 0.1, 1.0)))}
+    given = {"velocities": None, "stiffness_damping": 1e-3, **lifting}
+    with pytest.warns(ms.StepErrorWarning, match="estimated error") as told:
+        coarse = thrown(scene, steps=20, time_step=0.01, **given)
+    enough = float(re.search(r"Take steps of (\S+) s", str(told[0].message))[1])
+    assert coarse.step_errors.max() > 3 * 3e-4 and enough == 2e-3
+    fine = thrown(scene, steps=round(0.2 / enough), time_step=enough, **given)
+    assert fine.step_errors.max() < 3e-4  # 1 % of the extent
 
 
 def test_chosen_steps_repeat_and_refine_an_impact():

@@ -21,7 +21,7 @@ def test_a_rolling_sheet_takes_whole_steps(time_step):
     assert not move.substeps
 
 
-@pytest.mark.parametrize("time_step, integrator", [(8e-3, EULER), (4e-3, None)], ids=["euler", "default"])
+@pytest.mark.parametrize("time_step, integrator", [(4e-3, EULER), (8e-3, None)], ids=["euler", "default"])
 def test_a_rolling_sheet_depends_smoothly_on_the_field(time_step, integrator):
     given = {"time_step": time_step, "integrator": integrator}
     end = rolling_sheet(**given).positions[-1]

@@ -80,7 +80,8 @@ def warn_of_steps(move: Trajectory) -> None:
         return
     length = move.time_steps[worst]
     if errors[worst] >= limit:
-        order = len(move.integrator._times)
+        # The error of a step across an impact is of first order by any integrator.
+        order = 1 if scene.contacts else len(move.integrator._times)
         enough = _rounded(
             float((move.time_steps * (limit / np.maximum(errors, limit)) ** (1.0 / order)).min())
         )
