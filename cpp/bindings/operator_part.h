@@ -23,7 +23,7 @@ class OperatorPart {
                  }),
           model_(owner.cast<Model*>()),
           q_(std::move(q)),
-          product_(std::move(product)) {}
+          product_(std::move(product), size()) {}
 
     Index size() const { return model_->dof_map().size(); }
 
@@ -38,7 +38,7 @@ class OperatorPart {
     std::shared_ptr<py::object> owner_;
     Model* model_;
     VectorXd q_;
-    OperatorFactor::Operator product_;
+    RepeatedOperator product_;
 };
 
 using WeightedOperators = std::vector<std::pair<double, std::shared_ptr<OperatorPart>>>;

@@ -292,7 +292,8 @@ void Model::reduce_matrix(Factor& factor) {
         static_cast<LowRankFactor&>(factor).set_low_rank(low_rank_.reduced(dof_map_, size()),
                                                          low_rank_.stiffness());
     if (terms_.operators.empty()) return;
-    static_cast<OperatorFactor&>(factor).set_operator(operator_product(false), operator_product(true));
+    static_cast<OperatorFactor&>(factor).set_operator(operator_product(false), operator_product(true),
+                                                      !dof_map_.has_reduced_coordinates());
 }
 
 std::function<VectorXd(const VectorXd&)> Model::operator_product(bool rough) const {

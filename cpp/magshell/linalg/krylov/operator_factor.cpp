@@ -35,27 +35,53 @@ struct Count {
     double margin = 0.0;   // [-] distance of the nearest one from the bound, over the size of the largest one
 };
 
+// Returns whether Lanczos' method from a random start has missed no eigenvalue below `bound`, but with a probability of 1e-3. The lowest of
+// n eigenvalues is below the lowest Ritz value after k steps by more than the part e of their spread with a probability below
+//
+//   1.648 sqrt(n) exp(-(2 k - 1) sqrt(e))                      [Kuczynski92]
+//
+// Ritz values at both ends that are known take a step each, and the others have a smaller spread. An error of a Ritz value is
+// `length` times the last component of its vector.
+bool missed_none(const SymmetricEigen& ritz, double length, Index below, double bound, Index n) {
+    // [-] Probability, and the constant of its bound; fixed by test_a_strip_beyond_its_buckling_load_is_not_called_stable.
+    constexpr double probability = 1e-3, constant = 1.648;
+    // [-] Error of a Ritz value, over its distance from the bound; see test_operator_factor_solves_and_counts_as_the_dense_matrix.
+    constexpr double certain = 0.1;
+    const Index steps = static_cast<Index>(ritz.values.size());
+    const double needed = std::log(constant * std::sqrt(double(n)) / probability);
+    const auto is_certain = [&](Index k) {
+        return length * std::abs(ritz.vectors(steps - 1, k)) <= certain * std::abs(ritz.values[k] - bound);
+    };
+    for (Index low = below; low < steps; ++low) {
+        if (low > below && !is_certain(low - 1)) return false;
+        for (Index high = 0; low + high < steps; ++high) {
+            const double part = (ritz.values[low] - bound) / (ritz.values[steps - 1 - high] - bound);
+            if (double(2 * (steps - low - high) - 1) * std::sqrt(part) >= needed) return true;
+        }
+    }
+    return false;
+}
+
 // Counts the eigenvalues of A^-1 H below `bound` by Lanczos' method in the inner product of A, with full orthogonalization. Vectors v and
-// images z = A v are stored, so that products with A are not needed.
-Count count_below(const Factor& positive, const OperatorFactor::Operator& product, double bound) {
-    // Steps at least and at most, and the error of a Ritz value over its distance from the bound [-]; fixed by
-    // test_operator_factor_solves_and_counts_as_the_dense_matrix.
+// images z = A v are stored, so that products with A are not needed. diagonal: of A, so that unknowns of all units take part in the start.
+Count count_below(const Factor& positive, const VectorXd& diagonal, const OperatorFactor::Operator& product,
+                  double bound) {
+    // Steps at least and at most; fixed by test_operator_factor_solves_and_counts_as_the_dense_matrix.
     constexpr int fewest = 6, most = 200;
-    constexpr double certain = 0.1;  // [-] see test_operator_factor_solves_and_counts_as_the_dense_matrix
     // [-] Length of a new vector, over the largest entry, at which the vectors span an invariant subspace; fixed by
     // test_operator_factor_solves_and_counts_as_the_dense_matrix.
     constexpr double negligible = 1e-12;
     const Index n = positive.size();
     VectorXd z(n);
     std::uint64_t state = 88172645463325252ull;
-    for (double& each : z) {  // pseudo-random, the same in every run
+    for (Index k = 0; k < n; ++k) {  // pseudo-random, the same in every run
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;
-        each = static_cast<double>(state >> 11) * 0x1p-53 - 0.5;
+        z[k] = std::sqrt(std::abs(diagonal[k])) * (static_cast<double>(state >> 11) * 0x1p-53 - 0.5);
     }
     std::vector<VectorXd> images, vectors;
-    std::vector<double> diagonal, beside;
+    std::vector<double> products, beside;
     VectorXd v = z;
     positive.solve(v);
     double length = std::sqrt(std::max(0.0, z.dot(v))), largest = 0.0;
@@ -64,27 +90,22 @@ Count count_below(const Factor& positive, const OperatorFactor::Operator& produc
         images.push_back(z / length);
         vectors.push_back(v / length);
         z = product(vectors.back());
-        diagonal.push_back(z.dot(vectors.back()));
+        products.push_back(z.dot(vectors.back()));
         for (int sweep = 0; sweep < 2; ++sweep)
             for (std::size_t k = vectors.size(); k-- > 0;) z -= z.dot(vectors[k]) * images[k];
         v = z;
         positive.solve(v);
         length = std::sqrt(std::max(0.0, z.dot(v)));
-        largest = std::max({largest, std::abs(diagonal.back()), length});
+        largest = std::max({largest, std::abs(products.back()), length});
         const bool invariant = length <= negligible * largest || step == n;
         if (step >= fewest || invariant) {
             const Index size = static_cast<Index>(step);
             const SymmetricEigen ritz =
-                eigen_of_tridiagonal(Eigen::Map<const VectorXd>(diagonal.data(), size),
+                eigen_of_tridiagonal(Eigen::Map<const VectorXd>(products.data(), size),
                                      Eigen::Map<const VectorXd>(beside.data(), size - 1));
             count.below = 0;
             while (count.below < size && ritz.values[count.below] < bound) ++count.below;
-            // The Ritz values below the bound and the next one must be known well enough to tell their sides.
-            bool certain_of_all = count.below < size;
-            for (Index k = 0; k <= count.below && certain_of_all; ++k)
-                certain_of_all = length * std::abs(ritz.vectors(size - 1, k)) <=
-                                 certain * std::abs(ritz.values[k] - bound);
-            count.settled = invariant || certain_of_all;
+            count.settled = invariant || missed_none(ritz, length, count.below, bound, n);
             const double size_of_all =
                 std::max({1.0, std::abs(ritz.values[0]), std::abs(ritz.values[size - 1])});
             count.margin = (ritz.values.array() - bound).abs().minCoeff() / size_of_all;
@@ -131,16 +152,19 @@ FactorReport OperatorFactor::complete_report() {
     if (counted_) return report_;
     counted_ = true;
     Count count;
+    VectorXd diagonal(size());
+    for (Index j = 0; j < size(); ++j) diagonal[j] = entries_[pattern_->column_starts[j]];
     if (report_.negative_pivots == 0 && report_.perturbed_pivots == 0) {
-        count = count_below(*sparse_, rough_, -1.0);
-        if (!count.settled || count.margin < clear_margin) count = count_below(*sparse_, operator_, -1.0);
+        count = count_below(*sparse_, diagonal, rough_, -1.0);
+        if (!count.settled || count.margin < clear_margin)
+            count = count_below(*sparse_, diagonal, Operator(operator_), -1.0);
     } else {
         VectorXd shift;
         // K x = 0 means (A + D)^-1 (H - D) x = - x, with the shift D.
         if (const std::unique_ptr<Factor> positive = shifted(entries_, shift))
             count = count_below(
-                *positive, [&](const VectorXd& x) { return VectorXd(operator_(x) - shift.cwiseProduct(x)); },
-                -1.0);
+                *positive, diagonal,
+                [&](const VectorXd& x) { return VectorXd(operator_(x) - shift.cwiseProduct(x)); }, -1.0);
     }
     // Without a settled count K may be indefinite, so it is not called stable.
     report_.negative_pivots = count.settled ? count.below : std::max<Index>(count.below, 1);
@@ -157,7 +181,9 @@ VectorXd OperatorFactor::image(const VectorXd& x) const {
 void OperatorFactor::solve_approximately(VectorXd& rhs, double tolerance) const {
     if (!operator_) return sparse_->solve(rhs);
     const bool identity = tolerance > rounding_matters;
-    const Operator& added = tolerance >= rough_suffices ? rough_ : operator_;
+    const auto added = [&](const VectorXd& x) {
+        return tolerance >= rough_suffices ? rough_(x) : operator_(x);
+    };
     VectorXd before;
     const auto product = [&](const VectorXd& x) {
         return VectorXd((identity ? before : sparse_->image(x)) + added(x));

@@ -6,25 +6,27 @@
 // replaced by A plus a multiple of its diagonal that makes it positive definite.
 #pragma once
 
-#include <functional>
 #include <memory>
 
 #include "magshell/linalg/factor.h"
+#include "magshell/linalg/krylov/repeated_operator.h"
 
 namespace magshell {
 
 class OperatorFactor final : public Factor {
   public:
     /// Returns H x.
-    using Operator = std::function<VectorXd(const VectorXd&)>;
+    using Operator = RepeatedOperator::Product;
 
     explicit OperatorFactor(std::unique_ptr<Factor> sparse);
 
     /// Sets H until it is set again; an empty function is zero. rough: nearly the same product in less time, for solves with a large
-    /// tolerance and for counts that are far from a change.
-    void set_operator(Operator product, Operator rough) {
-        operator_ = std::move(product);
-        rough_ = std::move(rough);
+    /// tolerance and for counts that are far from a change. is_constant: whether the product stays the same until then.
+    void set_operator(Operator product, Operator rough, bool is_constant = true) {
+        operator_ = RepeatedOperator(std::move(product), size(), is_constant);
+        rough_ = [exact = operator_, rough = std::move(rough)](const VectorXd& x) {
+            return exact.is_dense() ? exact(x) : rough(x);
+        };
     }
     FactorReport factorize() override;
     /// A deferred report has the negative eigenvalues of A.
@@ -48,7 +50,8 @@ class OperatorFactor final : public Factor {
     std::unique_ptr<Factor> shifted(const LargeVector<double>& values, VectorXd& shift) const;
 
     std::unique_ptr<Factor> sparse_;
-    Operator operator_, rough_;
+    RepeatedOperator operator_;
+    Operator rough_;
     LargeVector<double> entries_;  // of A, which a factorization overwrites
     bool deferred_ = false, counted_ = true;
 };

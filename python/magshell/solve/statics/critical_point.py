@@ -121,6 +121,4 @@ def _refusal(inputs: Inputs, moving: AlongPath, kind: str) -> str:
         return "no gradient here: values of the scene change along the path; load parameters alone may"
     if inputs.scene.rigid_parts:
         return "no gradient here: the scene has rigid bodies or skeletons"
-    if inputs.scene.own_field is not None:
-        return "no gradient here: the stiffness of a scene with own_field is not a sparse matrix"
     return ""
