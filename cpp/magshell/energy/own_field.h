@@ -111,7 +111,7 @@ class OwnField {
     void set_accuracy(double accuracy) { accuracy_ = accuracy; }
     double accuracy() const { return accuracy_; }
     // Trees take less time beyond so many points; see benchmarks/own_field_costs.py.
-    static constexpr Index most_direct = 16000, most_direct_rough = 4000;
+    static constexpr Index most_direct = 8000, most_direct_rough = 2000;
     /// Returns the number of source points: four per element with a source, six per face with a normal magnetization if there are
     /// charges.
     Index n_points() const { return 4 * active_elements_ + (has_charges_ ? 6 * active_faces_ : 0); }

@@ -6,70 +6,19 @@
 #pragma once
 
 #include <array>
-#include <cstring>
 #include <vector>
 
 #include "magshell/core/vector3.h"
 #include "magshell/energy/own_field_pairs.h"
+#include "magshell/energy/simd_dual.h"
 
 namespace magshell {
 namespace own_field {
-
-/// A dual number in each lane.
-struct SimdDual {
-    SimdDouble value{0.0}, rate{0.0};
-
-    SimdDual() = default;
-    SimdDual(const SimdDouble& v, const SimdDouble& r) : value(v), rate(r) {}
-    SimdDual& operator+=(const SimdDual& b) {
-        value += b.value;
-        rate += b.rate;
-        return *this;
-    }
-    friend SimdDual operator+(const SimdDual& a, const SimdDual& b) {
-        return {a.value + b.value, a.rate + b.rate};
-    }
-    friend SimdDual operator-(const SimdDual& a, const SimdDual& b) {
-        return {a.value - b.value, a.rate - b.rate};
-    }
-    friend SimdDual operator*(const SimdDual& a, const SimdDual& b) {
-        return {a.value * b.value, a.rate * b.value + a.value * b.rate};
-    }
-    friend SimdDual operator*(const SimdDouble& a, const SimdDual& b) { return {a * b.value, a * b.rate}; }
-};
 
 inline SimdDual inverse_root(const SimdDual& a) {
     const SimdDouble root = magshell::inverse_root(a.value);
     return {root, SimdDouble(-0.5) * (root * root * root) * a.rate};
 }
-
-template <class T>
-struct LanesOf {
-    using Type = SimdDouble;
-    static Type load(const double* values, const double*) {
-        SimdDouble out;
-        std::memcpy(&out.lanes, values, sizeof out.lanes);
-        return out;
-    }
-    static Type broadcast(const double* values, const double*) { return SimdDouble(*values); }
-    static T sum(const Type& a) {
-        double sum = 0.0;
-        for (int lane = 0; lane < SimdDouble::width; ++lane) sum += a[lane];
-        return sum;
-    }
-};
-
-template <>
-struct LanesOf<Dual> {
-    using Type = SimdDual;
-    static Type load(const double* values, const double* rates) {
-        return {LanesOf<double>::load(values, nullptr), LanesOf<double>::load(rates, nullptr)};
-    }
-    static Type broadcast(const double* values, const double* rates) {
-        return {SimdDouble(*values), SimdDouble(*rates)};
-    }
-    static Dual sum(const Type& a) { return {LanesOf<double>::sum(a.value), LanesOf<double>::sum(a.rate)}; }
-};
 
 inline constexpr int most_points = 16;  // of an element
 
@@ -120,7 +69,7 @@ class PairMean {
     using Lanes = typename LanesOf<T>::Type;
 
     PairMean() {
-        value_ = Lanes(zero());
+        value_ = LanesOf<T>::zero();
         for (int side = 0; side < 2; ++side) {
             levels_[side] = none();
             for (Triple<Lanes>& node : nodes_[side]) node = none();
@@ -178,13 +127,7 @@ class PairMean {
     Triple<T> by_level(int side) const { return sum(levels_[side]); }
 
   private:
-    static Lanes zero() {
-        if constexpr (std::is_same_v<T, Dual>)
-            return SimdDual();
-        else
-            return SimdDouble(0.0);
-    }
-    static Triple<Lanes> none() { return {zero(), zero(), zero()}; }
+    static Triple<Lanes> none() { return {LanesOf<T>::zero(), LanesOf<T>::zero(), LanesOf<T>::zero()}; }
     static void add_scaled(const SimdDouble& factor, const Triple<Lanes>& more, Triple<Lanes>& out) {
         out.x += factor * more.x;
         out.y += factor * more.y;

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "magshell/core/vector3.h"
+#include "magshell/energy/simd_dual.h"
 
 namespace magshell {
 namespace {
@@ -18,12 +19,6 @@ SimdDouble load(const std::vector<double>& numbers, std::size_t first) {
 
 SimdVec3 load(const std::vector<double>* numbers, std::size_t first) {
     return {load(numbers[0], first), load(numbers[1], first), load(numbers[2], first)};
-}
-
-double sum_of_lanes(const SimdDouble& a) {
-    double sum = 0.0;
-    for (int lane = 0; lane < SimdDouble::width; ++lane) sum += a[lane];
-    return sum;
 }
 
 Triple<double> sum_of_lanes(const SimdVec3& a) {
@@ -79,6 +74,23 @@ void SourceArrays::set(std::size_t k, const SourcePoint<T>& point) {
     for (int c = 0; c < (has_currents_ ? components : 4); ++c) {
         values_[c][k] = value_of(*numbers[c]);
         if (!rates_[c].empty()) rates_[c][k] = rate_of(*numbers[c]);
+    }
+}
+
+void SourceArrays::gather(const SourceArrays& from, const std::vector<std::array<std::size_t, 2>>& ranges) {
+    std::size_t count = 0;
+    for (const auto& [first, last] : ranges) count += last - first;
+    resize(count, from.has_currents_, !from.rates_[0].empty());
+    for (int c = 0; c < (has_currents_ ? components : 4); ++c) {
+        std::size_t to = 0;
+        for (const auto& [first, last] : ranges) {
+            std::copy(from.values_[c].begin() + first, from.values_[c].begin() + last,
+                      values_[c].begin() + to);
+            if (!rates_[c].empty())
+                std::copy(from.rates_[c].begin() + first, from.rates_[c].begin() + last,
+                          rates_[c].begin() + to);
+            to += last - first;
+        }
     }
 }
 

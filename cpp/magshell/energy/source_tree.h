@@ -1,12 +1,14 @@
-// SourceTree: boxes of magnetic source points, for sums over distant points whose time grows little faster than their number.
+// SourceTree: balls of magnetic source points, for sums over distant points whose time grows little faster than their number.
 //
-// Points belong to groups, those of one edge or of one face, which stay together. A box is split at the median along its longest side. It
-// has axes of its own, the third across the sheet, and a grid of Chebyshev points, fewer along shorter sides. Distant boxes see each
-// other through their grids g_k, with the Lagrange polynomials L_k of these [Wilson, Vaughn, Krasny 2021]:
+// Points belong to groups, those of one edge or of one face, which stay together. The groups of a box are split at the median along the
+// longest side of the box. Distant boxes see each other through expansions in solid harmonics about their centers
+// (energy/solid_harmonics.h), up to a degree p:
 //
-//   sum_j q_j / |p - p_j|  =  sum_k L_k(p) sum_l w_l / |g_k - g_l|,     w_l = sum_j q_j L_l(p_j)
+//   sum_j q_j / |c + u - p_j|  =  sum L_l^m conj R_l^m(u),      L_l^m = (-1)^l sum M_k^n I_(l+k)^(m+n)(c - c'),  l + k <= p,
+//                                                               M_k^n = sum_j q_j conj R_k^n(p_j - c')
 //
-// The energy of the grids is a smooth function of the points, whose gradient and Hessian are exact, as long as the boxes stay in place.
+// The energy of the expansions is a smooth function of the points, whose gradient and Hessian are exact, as long as the boxes stay in place.
+// Two boxes act on each other alike.
 #pragma once
 
 #include <array>
@@ -17,25 +19,16 @@
 
 namespace magshell {
 
-/// Returns Chebyshev point i of n on [-1, 1].
-double chebyshev_point(int n, int i);
-
 class SourceTree {
   public:
     struct Box {
         Index first = 0, last = 0;  // range of order()
         Index parent = -1;
         std::array<Index, 2> children{-1, -1};
-        Vec3 center = Vec3::Zero(), half = Vec3::Zero();  // [m], half along the axes
-        Mat3 axes = Mat3::Identity();                     // columns
-        double radius = 0.0;                              // [m], of all points about the center
-        std::array<int, 3> counts{};                      // grid points along the axes
-        std::size_t grid = 0;                             // first point of the grid
-        int n_grid() const { return counts[0] * counts[1] * counts[2]; }
+        Vec3 center = Vec3::Zero();  // [m]
+        double radius = 0.0;         // [m], of all points about the center
         bool is_leaf() const { return children[0] < 0; }
     };
-
-    static constexpr int most_counts = 16;  // points of a grid along an axis
 
     /// points: [m], group by group. accuracy: error of the sums at a distant box, over the sums of their parts.
     SourceTree(const std::vector<Vec3>& points, Index group_size, double accuracy);
@@ -46,23 +39,21 @@ class SourceTree {
     /// Returns the groups, box by box.
     const std::vector<Index>& order() const { return order_; }
     Index group_size() const { return group_size_; }
-    /// Returns the coordinates of the points of all grids [m]; each grid begins at a SIMD vector.
-    const std::array<std::vector<double>, 3>& grids() const { return grids_; }
+    /// Returns the degree p of the expansions.
+    int degree() const { return degree_; }
 
   private:
-    Index split(Index first, Index last, Index parent, const Mat3& axes, const std::vector<Vec3>& points);
-    void set_grid(Box& box);
+    Index split(Index first, Index last, Index parent, const std::vector<Vec3>& points);
 
-    const Index group_size_, leaf_points_;
-    const double digits_;
+    const Index group_size_;
+    const int degree_;
     std::vector<Box> boxes_;
     std::vector<std::vector<Index>> levels_;
     std::vector<Index> order_;
     std::vector<Vec3> middles_;  // of groups
-    std::array<std::vector<double>, 3> grids_;
 };
 
-/// For each box of a tree the boxes of another that it sees through their grids, and for each leaf the leaves that it sees point by point.
+/// For each box of a tree the boxes of another that it sees through expansions, and for each leaf the leaves that it sees point by point.
 struct BoxPairs {
     std::vector<std::vector<Index>> distant, near;
 };

@@ -1,250 +1,396 @@
-// A fast multipole method that interpolates 1/r on Chebyshev grids: sources go to the grids of leaves and up the tree, from grid to
-// distant grid, and down the tree to the points. Near boxes are summed point by point.
+// A fast multipole method: sources go to the expansions of leaves and up the tree, from expansion to distant expansion, and down the tree
+// to the points. Near boxes are summed point by point. Lanes are points, or boxes that are treated alike.
+#include <algorithm>
 #include <array>
-#include <cstring>
 
 #include "magshell/core/parallel.h"
+#include "magshell/energy/solid_harmonics.h"
 #include "magshell/energy/source_tree.h"
 
 namespace magshell {
 namespace {
 
-constexpr int most = SourceTree::most_counts;
+constexpr int width = SimdDouble::width;
+using Complex = ComplexLanes<SimdDouble>;
+using Harmonics = std::vector<Complex>;  // for 0 <= m <= l
 
-// The values and slopes at one place u of the Lagrange polynomials of n Chebyshev points.
+// The numbers of an expansion for 0 <= m <= l, of all boxes, in components: of the charge or its potential, then three of the current or
+// its vector potential. For Dual, each component has two channels: value and rate.
 template <class T>
-struct Lagrange {
-    std::array<T, most> values, slopes;
-
-    Lagrange(int n, const T& u) {
-        // Products of u - p_j over the points j > i, and their slopes
-        std::array<T, most + 1> after, after_slopes;
-        after[n - 1] = T(1.0), after_slopes[n - 1] = T(0.0);
-        for (int i = n - 1; i > 0; --i) {
-            const T off = u - T(chebyshev().points[n][i]);
-            after[i - 1] = after[i] * off;
-            after_slopes[i - 1] = after_slopes[i] * off + after[i];
-        }
-        T before(1.0), before_slope(0.0);
-        for (int i = 0; i < n; ++i) {
-            const T weight(chebyshev().weights[n][i]), off = u - T(chebyshev().points[n][i]);
-            values[i] = weight * before * after[i];
-            slopes[i] = weight * (before_slope * after[i] + before * after_slopes[i]);
-            before_slope = before_slope * off + before;
-            before = before * off;
-        }
-    }
-
-  private:
-    struct Table {
-        double points[most + 1][most], weights[most + 1][most];
-        Table() {
-            for (int n = 1; n <= most; ++n)
-                for (int i = 0; i < n; ++i) {
-                    points[n][i] = chebyshev_point(n, i);
-                    weights[n][i] = 1.0;
-                    for (int j = 0; j < n; ++j)
-                        if (j != i) weights[n][i] /= chebyshev_point(n, i) - chebyshev_point(n, j);
-                }
-        }
-    };
-    static const Table& chebyshev() {
-        static const Table table;
-        return table;
-    }
-};
-
-// The Lagrange polynomials of the grid of a box at one place: one set along each axis of the box.
-template <class T>
-struct BoxBasis {
-    const SourceTree::Box& box;
-    Lagrange<T> x, y, z;
-
-    BoxBasis(const SourceTree::Box& b, const Triple<T>& place)
-        : box(b),
-          x(b.counts[0], local(b, place, 0)),
-          y(b.counts[1], local(b, place, 1)),
-          z(b.counts[2], local(b, place, 2)) {}
-
-    static T local(const SourceTree::Box& box, const Triple<T>& place, int axis) {
-        const Vec3 along = box.axes.col(axis) / box.half[axis];
-        return T(along.x()) * place.x + T(along.y()) * place.y + T(along.z()) * place.z -
-               T(along.dot(box.center));
-    }
-
-    // Calls body(number, value) for each point of the grid, with the value of its polynomial at the place.
-    template <class Body>
-    void each(const Body& body) const {
-        std::size_t number = box.grid;
-        for (int i = 0; i < box.counts[0]; ++i)
-            for (int j = 0; j < box.counts[1]; ++j) {
-                const T both = x.values[i] * y.values[j];
-                for (int k = 0; k < box.counts[2]; ++k) body(number++, both * z.values[k]);
-            }
-    }
-
-    // Adds the interpolated value of a function that `at(number)` returns at the points of the grid, and its gradient.
-    template <class At>
-    void interpolate(const At& at, T& value, Triple<T>& gradient) const {
-        T by[3]{};
-        std::size_t number = box.grid;
-        for (int i = 0; i < box.counts[0]; ++i) {
-            T row{}, row_y{}, row_z{};
-            for (int j = 0; j < box.counts[1]; ++j) {
-                T line{}, line_z{};
-                for (int k = 0; k < box.counts[2]; ++k) {
-                    const T here = at(number++);
-                    line += here * z.values[k];
-                    line_z += here * z.slopes[k];
-                }
-                row += line * y.values[j];
-                row_y += line * y.slopes[j];
-                row_z += line_z * y.values[j];
-            }
-            value += row * x.values[i];
-            by[0] += row * x.slopes[i];
-            by[1] += row_y * x.values[i];
-            by[2] += row_z * x.values[i];
-        }
-        for (int d = 0; d < 3; ++d) {
-            const Vec3 along = box.axes.col(d) / box.half[d];
-            gradient += by[d] * Triple<T>{T(along.x()), T(along.y()), T(along.z())};
-        }
-    }
-};
-
-// Numbers at the points of all grids, in components: the charge or its potential, then three of the current or its vector potential.
-// For Dual, each component has two channels: value and rate.
-template <class T>
-class GridNumbers {
+class Expansions {
   public:
     static constexpr int per = std::is_same_v<T, Dual> ? 2 : 1;
 
-    GridNumbers(const SourceTree& tree, bool has_currents)
-        : components_(has_currents ? 4 : 1), channels_(per * components_) {
-        for (int c = 0; c < channels_; ++c) numbers_[c].assign(tree.grids()[0].size(), 0.0);
+    Expansions(const SourceTree& tree, bool has_currents)
+        : degree_(tree.degree()),
+          count_(2 * static_cast<std::size_t>(harmonic_count(degree_))),
+          components_(has_currents ? 4 : 1) {
+        for (int c = 0; c < channels(); ++c) numbers_[c].assign(count_ * tree.boxes().size(), 0.0);
     }
 
+    int degree() const { return degree_; }
     int components() const { return components_; }
-    int channels() const { return channels_; }
-    double* channel(int c) { return numbers_[c].data(); }
-    const double* channel(int c) const { return numbers_[c].data(); }
-    T at(int component, std::size_t number) const {
-        if constexpr (per == 2)
-            return {numbers_[2 * component][number], numbers_[2 * component + 1][number]};
-        else
-            return numbers_[component][number];
+    int channels() const { return per * components_; }
+    /// Returns the real and imaginary parts by turns.
+    double* numbers(int channel, Index box) {
+        return numbers_[channel].data() + count_ * static_cast<std::size_t>(box);
     }
-    void add(int component, std::size_t number, const T& more) {
-        numbers_[per * component][number] += value_of(more);
-        if constexpr (per == 2) numbers_[2 * component + 1][number] += rate_of(more);
+    const double* numbers(int channel, Index box) const {
+        return numbers_[channel].data() + count_ * static_cast<std::size_t>(box);
+    }
+
+    /// Loads the expansions of `count` boxes, one in each lane; the other lanes are zero.
+    void load(int channel, const Index* boxes, int count, Harmonics& half, FullHarmonics& full) const {
+        const double* from[width];
+        for (int lane = 0; lane < count; ++lane) from[lane] = numbers(channel, boxes[lane]);
+        for (std::size_t k = 0; k < half.size(); ++k) {
+            half[k] = {SimdDouble(0.0), SimdDouble(0.0)};
+            for (int lane = 0; lane < count; ++lane) {
+                half[k].re.set(lane, from[lane][2 * k]);
+                half[k].im.set(lane, from[lane][2 * k + 1]);
+            }
+        }
+        full.set(half.data());
+    }
+    /// Adds a lane to the expansion of each box.
+    void add(int channel, const Index* boxes, int count, const Harmonics& half) {
+        for (int lane = 0; lane < count; ++lane) {
+            double* const to = numbers(channel, boxes[lane]);
+            for (std::size_t k = 0; k < half.size(); ++k) {
+                to[2 * k] += half[k].re[lane];
+                to[2 * k + 1] += half[k].im[lane];
+            }
+        }
     }
 
   private:
-    int components_, channels_;
+    int degree_;
+    std::size_t count_;
+    int components_;
     std::array<std::vector<double>, 8> numbers_;
 };
 
-// Returns the sources at the grid points that replace those of the points: first on leaves, then carried to parents.
-template <class T>
-GridNumbers<T> weights_of(const SourceTree& tree, const std::vector<SourcePoint<T>>& from,
-                          bool has_currents) {
-    GridNumbers<T> weights(tree, has_currents);
-    for (std::size_t level = tree.levels().size(); level-- > 0;) {
-        const std::vector<Index>& boxes = tree.levels()[level];
-        parallel_for(static_cast<int>(boxes.size()), [&](int number) {
-            const SourceTree::Box& box = tree.boxes()[boxes[number]];
-            if (box.is_leaf()) {
-                for (Index p = box.first * tree.group_size(); p < box.last * tree.group_size(); ++p) {
-                    const SourcePoint<T>& point = from[p];
-                    BoxBasis<T>(box, point.at).each([&](std::size_t k, const T& value) {
-                        weights.add(0, k, value * point.charge);
-                        if (!has_currents) return;
-                        weights.add(1, k, value * point.current.x);
-                        weights.add(2, k, value * point.current.y);
-                        weights.add(3, k, value * point.current.z);
-                    });
-                }
-                return;
-            }
-            for (const Index child_number : box.children) {
-                const SourceTree::Box& child = tree.boxes()[child_number];
-                for (std::size_t l = child.grid; l < child.grid + child.n_grid(); ++l) {
-                    const Triple<double> place{tree.grids()[0][l], tree.grids()[1][l], tree.grids()[2][l]};
-                    const BoxBasis<double> basis(box, place);
-                    basis.each([&](std::size_t k, double value) {
-                        for (int c = 0; c < weights.channels(); ++c)
-                            weights.channel(c)[k] += value * weights.channel(c)[l];
-                    });
-                }
-            }
-        });
-    }
-    return weights;
+// Runs body(boxes, count) over the boxes in lanes, on all threads.
+template <class Body>
+void each_lanes(const std::vector<Index>& boxes, const Body& body) {
+    const int count = static_cast<int>(boxes.size());
+    parallel_for((count + width - 1) / width,
+                 [&](int part) { body(boxes.data() + part * width, std::min(width, count - part * width)); });
 }
 
-// Adds the potentials of the grids of distant boxes at the points of a grid, for `channels` channels at once.
-template <int channels>
-void add_potentials(const SourceTree& targets, const SourceTree::Box& target, const SourceTree& sources,
-                    const std::vector<Index>& boxes, const double* const* weights, double* const* out) {
-    constexpr std::size_t width = SimdDouble::width;
-    const auto load = [](const double* from) {
-        SimdDouble pack;
-        std::memcpy(&pack.lanes, from, sizeof pack.lanes);
-        return pack;
-    };
-    for (std::size_t k = target.grid; k < target.grid + target.n_grid(); ++k) {
-        const SimdDouble x(targets.grids()[0][k]), y(targets.grids()[1][k]), z(targets.grids()[2][k]);
-        SimdDouble sums[channels];
-        for (SimdDouble& each : sums) each = SimdDouble(0.0);
-        for (const Index b : boxes) {
-            const SourceTree::Box& source = sources.boxes()[b];
-            for (std::size_t l = source.grid; l < source.grid + source.n_grid(); l += width) {
-                const SimdDouble dx = x - load(&sources.grids()[0][l]), dy = y - load(&sources.grids()[1][l]),
-                                 dz = z - load(&sources.grids()[2][l]);
-                const SimdDouble inverse = inverse_root(dx * dx + dy * dy + dz * dz);
-                for (int c = 0; c < channels; ++c) sums[c] += load(weights[c] + l) * inverse;
+// Returns the vectors from boxes to their parents, or back.
+Triple<SimdDouble> to_parents(const SourceTree& tree, const Index* boxes, int count) {
+    Triple<SimdDouble> out{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
+    for (int lane = 0; lane < count; ++lane) {
+        const SourceTree::Box& box = tree.boxes()[boxes[lane]];
+        const Vec3 way = box.center - tree.boxes()[box.parent].center;
+        out.x.set(lane, way.x());
+        out.y.set(lane, way.y());
+        out.z.set(lane, way.z());
+    }
+    return out;
+}
+
+void add_product(const Complex& a, const Complex& b, Complex& out) {
+    out.re += a.re * b.re;
+    out.re -= a.im * b.im;
+    out.im += a.re * b.im;
+    out.im += a.im * b.re;
+}
+
+// M_l^m += sum conj R_k^n M'_(l-k)^(m-n), about the center of the parent
+void shift_sources(int degree, const FullHarmonics& regular, const FullHarmonics& from, Harmonics& to) {
+    for (int l = 0; l <= degree; ++l)
+        for (int m = 0; m <= l; ++m) {
+            Complex sum{SimdDouble(0.0), SimdDouble(0.0)};
+            for (int k = 0; k <= l; ++k)
+                for (int n = std::max(-k, m - l + k); n <= std::min(k, m + l - k); ++n)
+                    add_product(regular(k, n), from(l - k, m - n), sum);
+            to[half_index(l, m)] = sum;
+        }
+}
+
+// L_l^m += sum L'_k^n conj R_(k-l)^(n-m), about the center of the child
+void shift_potentials(int degree, const FullHarmonics& regular, const FullHarmonics& from, Harmonics& to) {
+    for (int l = 0; l <= degree; ++l)
+        for (int m = 0; m <= l; ++m) {
+            Complex sum{SimdDouble(0.0), SimdDouble(0.0)};
+            for (int k = l; k <= degree; ++k)
+                for (int n = m - k + l; n <= m + k - l; ++n)
+                    add_product(from(k, n), regular(k - l, n - m), sum);
+            to[half_index(l, m)] = sum;
+        }
+}
+
+// L_l^m += (-1)^l sum M_k^n I_(l+k)^(m+n). Two successive m share the loads of M, and their sums do not wait for each other.
+void add_potentials(int degree, const FullHarmonics& irregular, const FullHarmonics& from, Harmonics& to) {
+    const SimdDouble zero(0.0);
+    for (int l = 0; l <= degree; ++l)
+        for (int m = 0; m <= l; m += 2) {
+            SimdDouble sums[8] = {zero, zero, zero, zero, zero, zero, zero, zero};
+            for (int k = 0; k <= degree - l; ++k) {
+                const Complex* const source = from.data() + full_index(k, -k);
+                const Complex* const kernel = irregular.data() + full_index(l + k, m - k);
+                for (int n = 0; n <= 2 * k; ++n) {
+                    const Complex &a = source[n], &b = kernel[n], &c = kernel[n + 1];
+                    sums[0] += a.re * b.re;
+                    sums[1] += a.im * b.im;
+                    sums[2] += a.re * b.im;
+                    sums[3] += a.im * b.re;
+                    sums[4] += a.re * c.re;
+                    sums[5] += a.im * c.im;
+                    sums[6] += a.re * c.im;
+                    sums[7] += a.im * c.re;
+                }
+            }
+            for (int i = 0; i < 2 && m + i <= l; ++i) {
+                Complex& out = to[half_index(l, m + i)];
+                const SimdDouble re = sums[4 * i] - sums[4 * i + 1], im = sums[4 * i + 2] + sums[4 * i + 3];
+                if (l % 2 == 0) {
+                    out.re += re;
+                    out.im += im;
+                } else {
+                    out.re -= re;
+                    out.im -= im;
+                }
             }
         }
-        for (int c = 0; c < channels; ++c)
-            for (std::size_t lane = 0; lane < width; ++lane) out[c][k] += sums[c][static_cast<int>(lane)];
-    }
 }
 
 template <class T>
-GridNumbers<T> potentials_of(const SourceTree& targets, const SourceTree& sources, const BoxPairs& pairs,
-                             const GridNumbers<T>& weights, bool has_currents) {
-    GridNumbers<T> potentials(targets, has_currents);
-    const double* from[8];
-    double* to[8];
-    for (int c = 0; c < weights.channels(); ++c) from[c] = weights.channel(c), to[c] = potentials.channel(c);
-    parallel_for(static_cast<int>(targets.boxes().size()), [&](int number) {
-        const SourceTree::Box& box = targets.boxes()[number];
-        if (pairs.distant[number].empty()) return;
-        constexpr int per = GridNumbers<T>::per;
-        if (has_currents)
-            add_potentials<4 * per>(targets, box, sources, pairs.distant[number], from, to);
-        else
-            add_potentials<per>(targets, box, sources, pairs.distant[number], from, to);
+using LanesType = typename LanesOf<T>::Type;
+
+// Points in lanes: relative to the center of their box, with their charge and current. Lanes behind the last one are at the center, and
+// have no strength.
+template <class T>
+struct PointLanes {
+    Triple<LanesType<T>> at;
+    LanesType<T> strengths[4];
+
+    PointLanes(const std::vector<SourcePoint<T>>& points, Index first, int count, const Vec3& center) {
+        using Lanes = LanesOf<T>;
+        at = {Lanes::zero(), Lanes::zero(), Lanes::zero()};
+        for (LanesType<T>& each : strengths) each = Lanes::zero();
+        for (int lane = 0; lane < count; ++lane) {
+            const SourcePoint<T>& point = points[first + lane];
+            Lanes::set(at.x, lane, point.at.x - T(center.x()));
+            Lanes::set(at.y, lane, point.at.y - T(center.y()));
+            Lanes::set(at.z, lane, point.at.z - T(center.z()));
+            Lanes::set(strengths[0], lane, point.charge);
+            Lanes::set(strengths[1], lane, point.current.x);
+            Lanes::set(strengths[2], lane, point.current.y);
+            Lanes::set(strengths[3], lane, point.current.z);
+        }
+    }
+};
+
+// Calls body(first, lanes, count) for the points of a box, in lanes.
+template <class T, class Body>
+void each_point_lanes(const SourceTree& tree, const SourceTree::Box& box,
+                      const std::vector<SourcePoint<T>>& points, const Body& body) {
+    const Index last = box.last * tree.group_size();
+    for (Index first = box.first * tree.group_size(); first < last; first += width) {
+        const int count = std::min<int>(width, last - first);
+        body(first, PointLanes<T>(points, first, count, box.center), count);
+    }
+}
+
+// Returns the expansions of the sources in each box: first of leaves, then carried to parents.
+template <class T>
+Expansions<T> sources_of(const SourceTree& tree, const std::vector<SourcePoint<T>>& from, bool has_currents) {
+    using Lanes = LanesType<T>;
+    Expansions<T> sources(tree, has_currents);
+    const int degree = tree.degree();
+    const std::size_t count = static_cast<std::size_t>(harmonic_count(degree));
+    parallel_for(static_cast<int>(tree.boxes().size()), [&](int number) {
+        const SourceTree::Box& box = tree.boxes()[number];
+        if (!box.is_leaf()) return;
+        std::vector<ComplexLanes<Lanes>> regular(count), sums(count * sources.components());
+        for (ComplexLanes<Lanes>& each : sums) each = {LanesOf<T>::zero(), LanesOf<T>::zero()};
+        each_point_lanes<T>(tree, box, from, [&](Index, const PointLanes<T>& points, int) {
+            set_regular_harmonics(degree, points.at, LanesOf<T>::one(), LanesOf<T>::zero(), regular.data());
+            for (int c = 0; c < sources.components(); ++c)
+                for (std::size_t k = 0; k < count; ++k) {
+                    sums[c * count + k].re += points.strengths[c] * regular[k].re;
+                    sums[c * count + k].im -= points.strengths[c] * regular[k].im;
+                }
+        });
+        for (int c = 0; c < sources.components(); ++c)
+            for (std::size_t k = 0; k < count; ++k) {
+                const T re = LanesOf<T>::sum(sums[c * count + k].re),
+                        im = LanesOf<T>::sum(sums[c * count + k].im);
+                constexpr int per = Expansions<T>::per;
+                sources.numbers(per * c, number)[2 * k] = value_of(re);
+                sources.numbers(per * c, number)[2 * k + 1] = value_of(im);
+                if (per == 1) continue;
+                sources.numbers(per * c + 1, number)[2 * k] = rate_of(re);
+                sources.numbers(per * c + 1, number)[2 * k + 1] = rate_of(im);
+            }
     });
-    // Carries potentials from the grids of boxes to those of their children.
-    for (std::size_t level = 1; level < targets.levels().size(); ++level) {
-        const std::vector<Index>& boxes = targets.levels()[level];
-        parallel_for(static_cast<int>(boxes.size()), [&](int number) {
-            const SourceTree::Box& child = targets.boxes()[boxes[number]];
-            const SourceTree::Box& box = targets.boxes()[child.parent];
-            for (std::size_t l = child.grid; l < child.grid + child.n_grid(); ++l) {
-                const Triple<double> place{targets.grids()[0][l], targets.grids()[1][l],
-                                           targets.grids()[2][l]};
-                const BoxBasis<double> basis(box, place);
-                basis.each([&](std::size_t k, double value) {
-                    for (int c = 0; c < potentials.channels(); ++c)
-                        potentials.channel(c)[l] += value * potentials.channel(c)[k];
-                });
+    for (std::size_t level = tree.levels().size(); level-- > 0;) {
+        std::vector<Index> parents;
+        for (const Index b : tree.levels()[level])
+            if (!tree.boxes()[b].is_leaf()) parents.push_back(b);
+        each_lanes(parents, [&](const Index* boxes, int boxes_count) {
+            Harmonics half(count);
+            FullHarmonics regular(degree), child_sources(degree);
+            for (int side = 0; side < 2; ++side) {
+                Index children[width];
+                for (int lane = 0; lane < boxes_count; ++lane)
+                    children[lane] = tree.boxes()[boxes[lane]].children[side];
+                regular.set_conjugate_regular(to_parents(tree, children, boxes_count), half);
+                for (int c = 0; c < sources.channels(); ++c) {
+                    sources.load(c, children, boxes_count, half, child_sources);
+                    shift_sources(degree, regular, child_sources, half);
+                    sources.add(c, boxes, boxes_count, half);
+                }
             }
         });
     }
+    return sources;
+}
+
+// Returns the expansions of the potentials about the centers of target boxes: of distant boxes, then those carried from parents.
+template <class T>
+Expansions<T> potentials_of(const SourceTree& targets, const SourceTree& sources, const BoxPairs& pairs,
+                            const Expansions<T>& from, bool has_currents) {
+    Expansions<T> potentials(targets, has_currents);
+    const int degree = targets.degree();
+    const std::size_t count = static_cast<std::size_t>(harmonic_count(degree));
+    parallel_for(static_cast<int>(targets.boxes().size()), [&](int number) {
+        const std::vector<Index>& distant = pairs.distant[number];
+        if (distant.empty()) return;
+        const Vec3& center = targets.boxes()[number].center;
+        Harmonics half(count), sums(count * from.channels(), Complex{SimdDouble(0.0), SimdDouble(0.0)});
+        FullHarmonics irregular(degree), of_sources(degree);
+        std::vector<Harmonics> by_channel(from.channels(),
+                                          Harmonics(count, {SimdDouble(0.0), SimdDouble(0.0)}));
+        for (std::size_t first = 0; first < distant.size(); first += width) {
+            const int boxes_count = static_cast<int>(std::min<std::size_t>(width, distant.size() - first));
+            Triple<SimdDouble> way;
+            for (int lane = 0; lane < width; ++lane) {
+                const Index b = distant[first + std::min(lane, boxes_count - 1)];
+                const Vec3 apart = center - sources.boxes()[b].center;
+                way.x.set(lane, apart.x());
+                way.y.set(lane, apart.y());
+                way.z.set(lane, apart.z());
+            }
+            irregular.set_irregular(way);
+            for (int c = 0; c < from.channels(); ++c) {
+                from.load(c, &distant[first], boxes_count, half, of_sources);
+                add_potentials(degree, irregular, of_sources, by_channel[c]);
+            }
+        }
+        for (int c = 0; c < from.channels(); ++c)
+            for (std::size_t k = 0; k < count; ++k) {
+                potentials.numbers(c, number)[2 * k] = sum_of_lanes(by_channel[c][k].re);
+                potentials.numbers(c, number)[2 * k + 1] = sum_of_lanes(by_channel[c][k].im);
+            }
+    });
+    for (std::size_t level = 1; level < targets.levels().size(); ++level)
+        each_lanes(targets.levels()[level], [&](const Index* boxes, int boxes_count) {
+            Harmonics half(count);
+            FullHarmonics regular(degree), of_parents(degree);
+            Index parents[width];
+            for (int lane = 0; lane < boxes_count; ++lane)
+                parents[lane] = targets.boxes()[boxes[lane]].parent;
+            regular.set_conjugate_regular(to_parents(targets, boxes, boxes_count), half);
+            for (int c = 0; c < potentials.channels(); ++c) {
+                potentials.load(c, parents, boxes_count, half, of_parents);
+                shift_potentials(degree, regular, of_parents, half);
+                potentials.add(c, boxes, boxes_count, half);
+            }
+        });
     return potentials;
+}
+
+// The real factors of R_l^m in a potential and its gradient: each is a sum of re Re R + im Im R over 0 <= m <= l.
+//
+//   phi = sum L_l^m conj R_l^m,   d phi/dz = sum L_(l+1)^m conj R_l^m,   d phi/dx + i d phi/dy = sum L_(l+1)^(m+1) conj R_l^m
+template <class T>
+class PotentialAtPoints {
+  public:
+    explicit PotentialAtPoints(int degree) : degree_(degree) {
+        for (int part = 0; part < 4; ++part)
+            for (int c = 0; c < 2 * Expansions<T>::per; ++c)
+                factors_[part][c].resize(static_cast<std::size_t>(harmonic_count(degree)));
+    }
+
+    /// Takes the expansion of a component.
+    void set(const Expansions<T>& potentials, int component, Index box) {
+        for (int rate = 0; rate < Expansions<T>::per; ++rate) {
+            const double* const numbers = potentials.numbers(Expansions<T>::per * component + rate, box);
+            const auto re = [&](int l, int m) { return numbers[2 * half_index(l, m)]; };
+            const auto im = [&](int l, int m) { return numbers[2 * half_index(l, m) + 1]; };
+            for (int l = 0; l <= degree_; ++l)
+                for (int m = 0; m <= l; ++m) {
+                    const double both = m == 0 ? 1.0 : 2.0;
+                    const std::size_t k = static_cast<std::size_t>(half_index(l, m));
+                    const auto put = [&](int part, double of_re, double of_im) {
+                        factors_[part][2 * rate][k] = of_re;
+                        factors_[part][2 * rate + 1][k] = of_im;
+                    };
+                    put(0, both * re(l, m), both * im(l, m));
+                    if (l == degree_) continue;
+                    put(3, both * re(l + 1, m), both * im(l + 1, m));
+                    if (m == 0) {
+                        put(1, re(l + 1, 1), 0.0);
+                        put(2, im(l + 1, 1), 0.0);
+                    } else {
+                        put(1, re(l + 1, m + 1) - re(l + 1, m - 1), im(l + 1, m + 1) - im(l + 1, m - 1));
+                        put(2, im(l + 1, m + 1) + im(l + 1, m - 1), -re(l + 1, m + 1) - re(l + 1, m - 1));
+                    }
+                }
+        }
+    }
+
+    /// Returns the potential and its gradient where the harmonics are R.
+    std::array<LanesType<T>, 4> operator()(const std::vector<ComplexLanes<LanesType<T>>>& regular) const {
+        std::array<LanesType<T>, 4> sums;
+        sums.fill(LanesOf<T>::zero());
+        const int count = harmonic_count(degree_), inner = harmonic_count(degree_ - 1);
+        for (int k = 0; k < inner; ++k)
+            for (int part = 0; part < 4; ++part) add(part, k, regular[k], sums[part]);
+        for (int k = inner; k < count; ++k) add(0, k, regular[k], sums[0]);
+        return sums;
+    }
+
+  private:
+    void add(int part, int k, const ComplexLanes<LanesType<T>>& r, LanesType<T>& sum) const {
+        const auto& of = factors_[part];
+        constexpr int last = 2 * (Expansions<T>::per - 1);
+        sum += LanesOf<T>::broadcast(&of[0][k], &of[last][k]) * r.re;
+        sum += LanesOf<T>::broadcast(&of[1][k], &of[last + 1][k]) * r.im;
+    }
+
+    int degree_;
+    std::array<std::array<std::vector<double>, 2 * Expansions<T>::per>, 4> factors_;
+};
+
+// Adds the sums over distant sources at the points of a leaf. The pull is -grad (q V - c . A) with the potentials V and A.
+template <class T>
+void add_distant(const SourceTree& tree, Index number, const std::vector<SourcePoint<T>>& at,
+                 const Expansions<T>& potentials, std::vector<SourceSums<T>>& out) {
+    const SourceTree::Box& box = tree.boxes()[number];
+    std::vector<PotentialAtPoints<T>> parts(potentials.components(), PotentialAtPoints<T>(tree.degree()));
+    for (int c = 0; c < potentials.components(); ++c) parts[c].set(potentials, c, number);
+    std::vector<ComplexLanes<LanesType<T>>> regular(static_cast<std::size_t>(harmonic_count(tree.degree())));
+    each_point_lanes<T>(tree, box, at, [&](Index first, const PointLanes<T>& points, int count) {
+        set_regular_harmonics(tree.degree(), points.at, LanesOf<T>::one(), LanesOf<T>::zero(),
+                              regular.data());
+        for (int c = 0; c < potentials.components(); ++c) {
+            const auto [value, x, y, z] = parts[c](regular);
+            const LanesType<T> strength = c == 0 ? -points.strengths[0] : points.strengths[c];
+            const LanesType<T> pull[3] = {strength * x, strength * y, strength * z};
+            for (int lane = 0; lane < count; ++lane) {
+                SourceSums<T>& sums = out[first + lane];
+                T* const values[4] = {&sums.charges, &sums.currents.x, &sums.currents.y, &sums.currents.z};
+                *values[c] += LanesOf<T>::lane(value, lane);
+                sums.pull += Triple<T>{LanesOf<T>::lane(pull[0], lane), LanesOf<T>::lane(pull[1], lane),
+                                       LanesOf<T>::lane(pull[2], lane)};
+            }
+        }
+    });
 }
 
 }  // namespace
@@ -253,42 +399,32 @@ template <class T>
 std::vector<SourceSums<T>> tree_sums(const SourceTree& targets, const std::vector<SourcePoint<T>>& at,
                                      const SourceTree& sources, const std::vector<SourcePoint<T>>& from,
                                      const BoxPairs& pairs, bool has_currents, bool same) {
-    const GridNumbers<T> weights = weights_of(sources, from, has_currents);
-    const GridNumbers<T> potentials = potentials_of(targets, sources, pairs, weights, has_currents);
+    const Expansions<T> of_sources = sources_of(sources, from, has_currents);
+    const Expansions<T> potentials = potentials_of(targets, sources, pairs, of_sources, has_currents);
     SourceArrays points;
     points.resize(from.size(), has_currents, std::is_same_v<T, Dual>);
     for (std::size_t k = 0; k < from.size(); ++k) points.set(k, from[k]);
     std::vector<SourceSums<T>> sums(at.size());
+    const std::size_t group_size = static_cast<std::size_t>(sources.group_size());
     parallel_for(static_cast<int>(targets.boxes().size()), [&](int number) {
         const SourceTree::Box& box = targets.boxes()[number];
         if (!box.is_leaf()) return;
-        for (Index group = box.first; group < box.last; ++group)
-            for (Index p = group * targets.group_size(); p < (group + 1) * targets.group_size(); ++p) {
-                const SourcePoint<T>& point = at[p];
-                SourceSums<T>& sum = sums[p];
-                const BoxBasis<T> basis(box, point.at);
-                // The pull is -grad (q V - c . A) with the potentials V and A of the other points.
-                Triple<T> gradient;
-                basis.interpolate([&](std::size_t k) { return potentials.at(0, k); }, sum.charges, gradient);
-                sum.pull -= point.charge * gradient;
-                if (has_currents) {
-                    T* const currents[3] = {&sum.currents.x, &sum.currents.y, &sum.currents.z};
-                    const T own[3] = {point.current.x, point.current.y, point.current.z};
-                    for (int c = 0; c < 3; ++c) {
-                        Triple<T> slope;
-                        basis.interpolate([&](std::size_t k) { return potentials.at(c + 1, k); },
-                                          *currents[c], slope);
-                        sum.pull += own[c] * slope;
-                    }
-                }
-                const std::size_t per_group = sources.group_size();
-                const std::size_t skip = same ? group * per_group : 0;
-                for (const Index b : pairs.near[number]) {
-                    const SourceTree::Box& near = sources.boxes()[b];
-                    points.add_sums(point, near.first * per_group, near.last * per_group, skip,
-                                    same ? skip + per_group : 0, sum);
-                }
-            }
+        add_distant(targets, number, at, potentials, sums);
+        std::vector<std::array<std::size_t, 2>> ranges;
+        std::size_t own = 0, count = 0;  // where the leaf itself begins, and points so far
+        for (const Index b : pairs.near[number]) {
+            const SourceTree::Box& source = sources.boxes()[b];
+            if (same && b == number) own = count;
+            ranges.push_back({source.first * group_size, source.last * group_size});
+            count += ranges.back()[1] - ranges.back()[0];
+        }
+        SourceArrays near;
+        near.gather(points, ranges);
+        for (Index group = box.first; group < box.last; ++group) {
+            const std::size_t skip = same ? own + (group - box.first) * group_size : 0;
+            for (Index p = group * targets.group_size(); p < (group + 1) * targets.group_size(); ++p)
+                near.add_sums(at[p], 0, near.size(), skip, same ? skip + group_size : 0, sums[p]);
+        }
     });
     return sums;
 }

@@ -29,7 +29,7 @@ class OwnField(Frozen):
     sources on the border of a shell only; a normal one, or a tangential one that rotates without stretching
     (magnetization_law="rotates"), has sources on all edges. The sources of a solid are charges on the faces of its
     tetrahedra, four points a face; a uniform magnetization that stretches with the solid has them on the surface only. Up
-    to 16,000 points all pairs are summed; beyond, distant points are summed by boxes of a tree.
+    to 8,000 points all pairs are summed; beyond, distant points are summed by boxes of a tree.
 
     A magnet that moves freely is a RigidBody or Link with a magnetic_moment, a point dipole at its center: right from a
     distance of some sizes on. Nearer it is a Solid all of whose vertices belong to a RigidBody.
@@ -39,7 +39,7 @@ class OwnField(Frozen):
     bodies: the bodies whose field acts, on all of them: Shells, Solids that are magnetized throughout, Solids with a skin,
         and RigidBodies or Links with a magnetic_moment; None: all magnetized bodies of the scene, which must be such.
         Shells that are tied to each other may have it if no edge has more than two faces.
-    accuracy: error of the sums over more than 16,000 points, over the size of the forces, from 1e-9 to 1e-2; None: all sums
+    accuracy: error of the sums over more than 8,000 points, over the size of the forces, from 1e-9 to 1e-2; None: all sums
         are over all pairs, in a time that grows with the square of the number of points.
     max_points: the largest number of points with a source; a solve with more raises ValueError.
 
