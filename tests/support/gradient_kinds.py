@@ -368,7 +368,10 @@ MAKERS = {
     "two sheets in motion": two_sheets_in_motion,
     **GROWTH_MAKERS,  # makers draw from one stream of random numbers: new ones come last
     **step_makers(
-        moving, lambda **options: thrown(ob.Box, **options, **RUBS), motorized_skeleton_in_motion, STEPS
+        moving,
+        lambda **options: thrown(ob.Box, ms.TRBDF2(implicit_contact=True), **options, **RUBS),
+        motorized_skeleton_in_motion,
+        STEPS,
     ),
     "onto a Plane, contact implicit": lambda: thrown(
         ob.Plane, ms.TRBDF2(implicit_contact=True), extra=VISCOUS, step=2e-6, face_samples=1, **RUBS
