@@ -13,14 +13,14 @@ from magshell.envs import robots  # noqa: E402
 ACTIONS = np.random.default_rng(0).uniform(-0.8, 0.8, (3, 3))
 
 
-def moving_strip(reward=None, **options):
+def moving_strip(reward=None, contacts=(), **options):
     """Return a strip that a field and its moving clamp drive."""
     mesh = ms.meshes.rectangle(0.05, 0.01, cells=(5, 1))
     sheet = ms.Shell(
         mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3, remanent_magnetization=(3e4, 0.0, 0.0)
     )
     clamp = ms.Clamp(mesh.edges_at(x=0.0), displacement=(0, 0, 0))
-    scene = ms.Scene(sheet, supports=[clamp], field=ms.UniformField())
+    scene = ms.Scene(sheet, supports=[clamp], contacts=contacts, field=ms.UniformField())
     tip = mesh.vertices_at(x=0.05)
     return ms.envs.Environment(
         scene,
@@ -35,6 +35,22 @@ def moving_strip(reward=None, **options):
         actions_per_episode=10,
         simulate={"integrator": ms.ImplicitEuler(), "stiffness_damping": 1e-3, **options},
     )
+
+
+def strip_on_a_floor(integrator=None):
+    """Return the strip with its tip on a floor."""
+    floor = ms.Contact(
+        ms.obstacles.Plane(center=(0, 0, -3e-4)), friction_coefficient=0.3, contact_stiffness=20.0
+    )
+    return moving_strip(contacts=[floor], integrator=integrator)
+
+
+ROBOTS = {
+    "strip": robots.magnetic_strip,
+    "moving clamp": moving_strip,
+    "on a floor": strip_on_a_floor,
+    "on a floor, contact implicit": lambda: strip_on_a_floor(ms.TRBDF2(implicit_contact=True)),
+}
 
 
 def rolled(environment, state, actions):
@@ -63,9 +79,9 @@ def assert_close(found, expected, fraction):
     assert np.abs(found - expected).max() < fraction * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("robot", ["strip", "moving clamp"])
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_gradients_by_all_actions_match_differences(robot):
-    environment = robots.magnetic_strip() if robot == "strip" else moving_strip()
+    environment = ROBOTS[robot]()
     environment.reset(seed=1)
     state = environment.differentiable_state()
     size = environment.action_space.shape[0]
@@ -99,17 +115,19 @@ def test_gradients_by_the_velocities_of_the_start_match_differences(integrator):
     assert abs(found - expected) < 1e-5 * abs(expected)
 
 
-def test_differentiable_steps_have_the_bits_of_steps():
-    environment, other = robots.magnetic_strip(), robots.magnetic_strip()
+@pytest.mark.parametrize("robot", ["strip", "on a floor"])
+def test_differentiable_steps_have_the_bits_of_steps(robot):
+    environment, other = ROBOTS[robot](), ROBOTS[robot]()
     environment.reset(seed=4)
     other.reset(seed=4)
     state = environment.differentiable_state()
-    for action in ACTIONS:
+    actions = np.random.default_rng(0).uniform(-0.8, 0.8, (3, environment.action_space.shape[0]))
+    for action in actions:
         state, seen, reward = environment.differentiable_step(state, torch.tensor(action))
         expected, expected_reward, *_ = other.step(action)
         np.testing.assert_array_equal(seen.numpy(), expected)
         assert float(reward) == expected_reward
-    assert state.time == pytest.approx(0.06)
+    assert state.time == pytest.approx(len(actions) * environment.steps_per_action * environment.time_step)
     again = other.differentiable_state()
     np.testing.assert_array_equal(again.positions.numpy(), state.positions.numpy())
     np.testing.assert_array_equal(again.edge_rotations.numpy(), state.edge_rotations.numpy())

@@ -23,6 +23,7 @@ from ..output.plot.style import Style, style_of
 from ..output.plot.view import View, view_of
 from ..output.plot.window import FrameWindow
 from ..output.results.state import states_of
+from ..solve.dynamics.contact_method import integrator_of_actions
 from ..solve.dynamics.simulate import simulate as simulate_motion
 from .action import Action
 from .bounds import Bounds
@@ -73,7 +74,8 @@ class Environment(gymnasium.Env):
     finished: function of a Snapshot that returns whether the episode ends there.
     failure_reward: if a step of the motion fails, the episode ends with this reward, at the last good state, and
         info["failure"] says why. None: ms.NotConverged is raised.
-    simulate: {name: value}, further arguments of ms.simulate: integrator, damping, solver, ...
+    simulate: {name: value}, further arguments of ms.simulate: integrator, damping, solver, ... In a scene with contacts
+        ImplicitEuler() is the default, so that `differentiable_step` has the bits of `step`.
     observation_bounds: (lower, upper) of the observation space, numbers or arrays of the observation's shape; by default
         infinite.
     clip: replace numbers of actions beyond -1 and 1, and of observations beyond their bounds, by the bounds; info says how
@@ -158,6 +160,8 @@ class Environment(gymnasium.Env):
         self.steps_per_action: int = count("steps_per_action", steps_per_action)
         self.actions_per_episode: int = count("actions_per_episode", actions_per_episode)
         self._options = dict(named_values("simulate", simulate))
+        if scene.contacts and self._options.get("integrator") is None:
+            self._options["integrator"] = integrator_of_actions()
         known = [
             name for name in inspect.signature(simulate_motion).parameters if name not in (*_OWN, "scene")
         ]

@@ -23,6 +23,15 @@ def default_integrator(inputs: Inputs) -> Integrator:
     return ImplicitEuler() if _added_mass(inputs) > 0.0 else TRBDF2(implicit_contact=True)
 
 
+def integrator_of_actions() -> Integrator:
+    """Return the integrator of an environment with contacts for which none is given.
+
+    Each differentiable action is a motion that starts from positions and velocities alone. TRBDF2 computes the accelerations
+    there again and takes another first step than in a motion that goes on; ImplicitEuler has the same bits.
+    """
+    return ImplicitEuler()
+
+
 def check_contact_method(inputs: Inputs, integrator: Integrator) -> None:
     """Raise ValueError if an integrator cannot treat the contact of a motion as it is asked to."""
     scene = inputs.scene
