@@ -339,7 +339,7 @@ def test_gradients_through_a_step_that_was_taken_in_parts():
     """Check gradients by prescribed motions that are evaluated within a subdivided step."""
     ball, steps, time_step = ob.Sphere(0.004, center=(0.03, 0.01, -0.03)), 5, 1e-3
     hits = ms.Contact(ball, contact_stiffness=200.0, friction_coefficient=0.3)
-    scene = ms.Scene(SHEET, supports=[CLAMP], field=CUBE, contacts=[hits])
+    scene = ms.Scene(SHEET, supports=[CLAMP], field=PAIR, contacts=[hits])
     weights = torch.tensor(1e3 * np.random.default_rng(0).standard_normal((N_V, 3)))
     given = {
         "ball": ends(lambda t: (0.03, 0.01, -0.03 + 6 * t), steps, time_step),
@@ -350,7 +350,7 @@ def test_gradients_through_a_step_that_was_taken_in_parts():
         values = {
             ball: {"center": given["ball"]},
             CLAMP: {"displacement": given["lift"]},
-            CUBE: {"center": approach},
+            PAIR: {"positions": lambda t: PAIR.positions + approach(t) - approach(0.0)},
         }
         move = ms.simulate(scene, steps=steps, time_step=time_step, values=values, **MAGNETIZED, **EXACT)
         assert move.substeps
