@@ -89,6 +89,7 @@ class OwnField {
         std::vector<Vec3> of_tetrahedra;  // by the magnetization [J m/A]
         std::vector<DipoleWeights> of_dipoles;
         RestGradient rest;
+        std::vector<Vec3> by_position;  // the product of the Hessian with lambda, of each of nodes() [N]
     };
     /// Trees of the source points, and the pairs of boxes whose sums they replace.
     struct Trees;

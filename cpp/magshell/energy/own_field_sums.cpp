@@ -196,7 +196,9 @@ OwnField::FaceGradient OwnField::vjp(const double* q, const double* lambda) cons
                     std::vector<double>(faces_.size(), 0.0),
                     std::vector<Vec3>(n_tetrahedra_, Vec3::Zero()),
                     std::vector<DipoleWeights>(dipoles_.size()),
+                    {},
                     {}};
+    for (const Triple<Dual>& each : found.by_position) by.by_position.push_back(rates_of(each));
     const std::vector<Triple<Dual>> x = positions<Dual>(q, lambda);
     const Geometry<Dual> at(*this, x);
     for (Index f = 0; f < n_faces; ++f) {

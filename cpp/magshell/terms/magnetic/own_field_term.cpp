@@ -9,13 +9,30 @@
 namespace magshell {
 namespace {
 
-class OwnFieldHessian final : public RoughHessianOperator {
-  public:
-    OwnFieldHessian(std::shared_ptr<const OwnField> field, const VectorXd& q,
-                    const OwnField::Neighbours& near, double factor)
-        : field_(std::move(field)), q_(q), near_(near), factor_(factor) {}
+std::vector<OwnField::RigidNodes> rigid_nodes_of(const std::vector<OwnFieldTerm::Magnet>& magnets) {
+    std::vector<OwnField::RigidNodes> rigid;
+    for (const OwnFieldTerm::Magnet& magnet : magnets) rigid.push_back({magnet.nodes});
+    return rigid;
+}
 
-    void add_product(const VectorXd& x, VectorXd& y) const override { add(near_, x, y); }
+}  // namespace
+
+class OwnFieldTerm::Hessian final : public RoughHessianOperator {
+  public:
+    Hessian(std::shared_ptr<const OwnField> field, const State& state, double factor,
+            std::shared_ptr<const Product> known)
+        : field_(std::move(field)),
+          q_(state.q),
+          near_(state.near),
+          factor_(factor),
+          known_(known && known->q == q_ ? std::move(known) : nullptr) {}
+
+    void add_product(const VectorXd& x, VectorXd& y) const override {
+        if (known_ && x == known_->direction)
+            y += factor_ * known_->image;
+        else
+            add(near_, x, y);
+    }
     void add_rough_product(const VectorXd& x, VectorXd& y) const override {
         std::call_once(has_rough_, [this] { rough_ = field_->rough(q_.data(), near_); });
         add(rough_, x, y);
@@ -32,17 +49,10 @@ class OwnFieldHessian final : public RoughHessianOperator {
     VectorXd q_;
     OwnField::Neighbours near_;
     double factor_;
+    std::shared_ptr<const Product> known_;  // nullptr if none is known
     mutable std::once_flag has_rough_;
     mutable OwnField::Neighbours rough_;
 };
-
-std::vector<OwnField::RigidNodes> rigid_nodes_of(const std::vector<OwnFieldTerm::Magnet>& magnets) {
-    std::vector<OwnField::RigidNodes> rigid;
-    for (const OwnFieldTerm::Magnet& magnet : magnets) rigid.push_back({magnet.nodes});
-    return rigid;
-}
-
-}  // namespace
 
 OwnFieldTerm::OwnFieldTerm(Sources sources, Index max_points, double accuracy, const Nodes& nodes,
                            Registry& registry)
@@ -79,6 +89,7 @@ bool OwnFieldTerm::set_values(const Values& values) {
     for (const ParameterSlice& magnetization : of_solids_) changed |= values.changed(magnetization);
     for (std::size_t k = 0; k < magnets_.size(); ++k) changed |= values.changed(moment_[k], center_[k]);
     if (!changed) return false;
+    product_.reset();
     magnetizations_.clear();
     thicknesses_.clear();
     for (std::size_t k = 0; k < sheets_.size(); ++k)
@@ -126,8 +137,7 @@ std::shared_ptr<const HessianOperator> OwnFieldTerm::hessian_operator(
     const double* q, const LoadParameters& load_parameters) const {
     const double factor = load_parameters[factor_.first];
     if (!sources_->acts() || factor == 0.0) return nullptr;
-    const std::shared_ptr<const State> state = state_at(q);
-    return std::make_shared<const OwnFieldHessian>(sources_, state->q, state->near, factor);
+    return std::make_shared<const Hessian>(sources_, *state_at(q), factor, product_);
 }
 
 std::shared_ptr<const OwnFieldTerm::State> OwnFieldTerm::state_at(const double* q) const {
@@ -174,6 +184,12 @@ void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, c
     const double factor = load_parameters[factor_.first];
     OwnField::FaceGradient by = field_.vjp(q, lambda);
     by_rest_ = std::move(by.rest);
+    Product product{.q = Eigen::Map<const VectorXd>(q, n_dofs_),
+                    .direction = Eigen::Map<const VectorXd>(lambda, n_dofs_),
+                    .image = VectorXd::Zero(n_dofs_)};
+    for (std::size_t k = 0; k < by.by_position.size(); ++k)
+        product.image.segment<3>(3 * field_.nodes()[k]) = by.by_position[k];
+    product_ = std::make_shared<const Product>(std::move(product));
     std::size_t triangle = 0;
     for (std::size_t k = 0; k < sheets_.size(); ++k)
         for (Index t = 0; t < sheets_[k].n_triangles(); ++t, ++triangle) {

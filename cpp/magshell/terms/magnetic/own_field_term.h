@@ -56,6 +56,11 @@ class OwnFieldTerm final : public OperatorTerm, public RestShapeTerm {
         double energy;                  // [J]
         std::vector<Vec3> by_position;  // [N]
     };
+    /// A product of the Hessian for a factor of one, which vjp() has computed beside the derivatives by values.
+    struct Product {
+        VectorXd q, direction, image;
+    };
+    class Hessian;
     /// Returns the own field at q, which is kept until it is asked for at another state.
     std::shared_ptr<const State> state_at(const double* q) const;
     /// Adds the derivatives by the corners of the triangles of solids at rest.
@@ -77,7 +82,8 @@ class OwnFieldTerm final : public OperatorTerm, public RestShapeTerm {
     std::shared_ptr<const OwnField>
         sources_;  // of the elements with a source; shared with the Hessians of earlier solves, so it is replaced, never changed
     mutable std::shared_ptr<const State> state_;
-    OwnField::RestGradient by_rest_;  // of the last vjp()
+    std::shared_ptr<const Product> product_;  // of the last vjp()
+    OwnField::RestGradient by_rest_;          // of the last vjp()
 };
 
 }  // namespace magshell

@@ -4,18 +4,18 @@
     J = d/dt K(q + t u, c + t (c1 - c)),   K u = g(q, c) - g(q, c1)
 
 with the state q and the load parameters c of K, and the load parameters c1 towards which these go. u depends on the inputs,
-and about an equilibrium q does. Each costs one solve with K for all inputs.
+and about an equilibrium q does. Each costs one solve with K for all inputs, whose factorization the factors have left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import NoGradient
-from .eigenvalue import EigenvalueAdjoint, multiplier_of
+from .eigenvalue import EigenvalueAdjoint
 from .residual import Residual
 
 if TYPE_CHECKING:
@@ -29,8 +29,9 @@ class BucklingAdjoint(EigenvalueAdjoint):
     """The gradients of buckling factors with respect to the inputs of the state with stiffness K, and to further load
     parameters.
 
-    residual: there. after: c1. response: u of all unknowns. vectors: (size, m), modes v of all unknowns. complete: as in
-        EigenvalueAdjoint. leaves: each with BEFORE or AFTER. at_rest: the state does not depend on the inputs.
+    residual: there. solve: with K, for the free unknowns. after: c1. response: u of all unknowns. vectors: (size, m), modes
+        v of all unknowns. complete: as in EigenvalueAdjoint. leaves: each with BEFORE or AFTER. at_rest: the state does not
+        depend on the inputs.
     refusal: why there is no gradient, or "".
     """
 
@@ -39,6 +40,7 @@ class BucklingAdjoint(EigenvalueAdjoint):
     def __init__(
         self,
         residual: Residual,
+        solve: Callable[[np.ndarray], np.ndarray],
         after: np.ndarray,
         response: np.ndarray,
         factors: np.ndarray,
@@ -50,7 +52,7 @@ class BucklingAdjoint(EigenvalueAdjoint):
         refusal: str = "",
     ):
         super().__init__(residual.inputs, factors, leaves, complete)
-        self._residual, self._after, self._response = residual, after, response
+        self._residual, self._solve, self._after, self._response = residual, solve, after, response
         self._vectors, self._at_rest, self._refusal = vectors, at_rest, refusal
 
     def _refuse(self, k: int) -> None:
@@ -61,14 +63,14 @@ class BucklingAdjoint(EigenvalueAdjoint):
     def _gradient(self, k: int) -> tuple[Gradient, ...]:
         here, factor, response = self._residual, self._eigenvalues[k], self._response
         vector = self._vectors[:, k]
-        vector = vector * np.sqrt(factor / (vector @ here.derivatives(vector).by_state))
+        vector = vector * np.sqrt(factor / (vector @ here.product(vector)))
         by_stiffness = here.hessian_derivatives(vector, vector)
         rates = here.hessian_derivative_rates(vector, response, self._after - here.load_parameters)
         # d/dt [(1 - t) K_c] for the load parameters before, d/dt [t K_c] for those after.
         by_after = factor * by_stiffness.by_load_parameters
         total = by_stiffness.plus(factor, rates)
         total = total._replace(by_load_parameters=total.by_load_parameters - by_after)
-        multiplier = multiplier_of(here, factor * by_stiffness.by_state)
+        multiplier = self._multiplier(factor * by_stiffness.by_state)
         there = here.at(here.state, self._after).derivatives(multiplier)
         total = total.plus(1.0, here.hessian_derivatives(multiplier, response)).plus(
             -1.0, here.derivatives(multiplier)
@@ -78,6 +80,11 @@ class BucklingAdjoint(EigenvalueAdjoint):
         if self._at_rest:
             total = total.at_fixed_state()
         else:
-            total = total.plus(1.0, here.derivatives(multiplier_of(here, total.by_state)))
+            total = total.plus(1.0, here.derivatives(self._multiplier(total.by_state)))
         after = total.at_fixed_state()._replace(by_load_parameters=by_after)
         return here.by_inputs(total), here.by_inputs(after)
+
+    def _multiplier(self, by_state: np.ndarray) -> np.ndarray:
+        """Return the solution w of K w = -by_state for the free unknowns, of all unknowns."""
+        model = self._inputs.scene._model
+        return model.expand(self._solve(-model.reduce(by_state)))

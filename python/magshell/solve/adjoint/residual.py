@@ -18,7 +18,7 @@ from ... import _core
 from ...errors import NoGradient
 from ...model.scene.reshaped import REST
 from ...model.scene.values import Gradient
-from .differences import ROUNDING, directional_derivative
+from .differences import ROUNDING, directional_derivative, mixed_derivative
 from .factorized import StiffnessParts, stiffness_parts
 
 if TYPE_CHECKING:
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 # an edge turns; and the fractions (1) of it that are tried until differences of sixth and eighth order agree. Tested by
 # test_frequencies_have_the_gradients_of_differences.
 _STEP, _SHORTER = 1 / 64, (1.0, 0.25, 0.1, 1e-2, 1e-3, 1e-4)
-# The error (1) of `hessian_derivatives`, a derivative by differences itself, over its largest entry of one kind. Tested by
-# test_factors_have_the_gradients_of_differences.
-_OF_DIFFERENCES = 1e-11
+# The number of those steps that are too long for the own field, in which sources of one edge are near each other. Tested by
+# test_buckling_factors_have_gradients_with_the_own_field.
+_TOO_LONG = 1
 
 
 class Derivatives(NamedTuple):
@@ -142,38 +142,50 @@ class Residual:
         Raises NoGradient where the forces are not smooth.
         """
 
-        def at(step: float) -> Derivatives:
-            there = self.at(self.state + step * along, self.load_parameters + step * rate)
-            return there.hessian_derivatives(motion, motion)
+        lengths = self._relative_size(motion), self._relative_size(along) or 1.0
+        if lengths[0] == 0.0:
+            return self._split(np.zeros(sum(self._counts)))
+        moved, turned, loaded = motion / lengths[0], along / lengths[1], rate / lengths[1]
 
-        self._prepare()
-        return self._rates(at, self._relative_size(along) or 1.0, _OF_DIFFERENCES)
+        def at(first: float, second: float) -> np.ndarray:
+            load_parameters = self.load_parameters + second * loaded
+            there = self.at(self.state + first * moved + second * turned, load_parameters)
+            return self._rows(there.derivatives(motion))
 
-    def _rates(
-        self, function: Callable[[float], Derivatives], length: float, rounding: float = ROUNDING
-    ) -> Derivatives:
+        rates = mixed_derivative(at, self._steps, ROUNDING, self._sizes(self._parts))
+        return self._from_rows(rates).times(lengths[0] * lengths[1])
+
+    def _rates(self, function: Callable[[float], Derivatives], length: float) -> Derivatives:
         """Return the derivative of a function of one number at 0, in steps of a fraction over this length."""
-        parts, zero = self._parts, function(0.0)
         if length == 0.0:
-            return Derivatives(*(np.zeros_like(each) for each in zero))
+            return self._split(np.zeros(sum(self._counts)))
+        steps = [step / length for step in self._steps]
+        sizes = self._sizes(self._parts)
+        return self._from_rows(
+            directional_derivative(lambda step: self._rows(function(step)), steps, ROUNDING, sizes)
+        )
 
-        def rows(step: float) -> np.ndarray:
-            flat = np.concatenate(function(step))
-            found = np.zeros((len(parts), max(part.stop - part.start for part in parts)))
-            for row, part in zip(found, parts, strict=True):
-                row[: part.stop - part.start] = flat[part]
-            return found
+    def _rows(self, derivatives: Derivatives) -> np.ndarray:
+        """Return derivatives as rows of one unit each, filled up with zeros."""
+        parts, flat = self._parts, np.concatenate(derivatives)
+        rows = np.zeros((len(parts), max(part.stop - part.start for part in parts)))
+        for row, part in zip(rows, parts, strict=True):
+            row[: part.stop - part.start] = flat[part]
+        return rows
 
-        steps = [_STEP * shorter / length for shorter in _SHORTER]
-        rates = directional_derivative(rows, steps, rounding, self._sizes(parts))
-        if rates is None:
+    def _from_rows(self, rows: np.ndarray | None) -> Derivatives:
+        """Return the derivatives of which these are the rows. Raises NoGradient if there are none."""
+        if rows is None:
             raise NoGradient(
                 "no gradient here: the stiffness is not smooth at this state; contacts may open or close there"
             )
-        flat = np.concatenate([np.zeros_like(each) for each in zero])
-        for row, part in zip(rates, parts, strict=True):
+        flat = np.zeros(sum(self._counts))
+        for row, part in zip(rows, self._parts, strict=True):
             flat[part] = row[: part.stop - part.start]
-        return Derivatives(*np.split(flat, np.cumsum([each.size for each in zero])[:-1]))
+        return self._split(flat)
+
+    def _split(self, flat: np.ndarray) -> Derivatives:
+        return Derivatives(*np.split(flat, np.cumsum(self._counts)[:-1]))
 
     def prescribed(self, by_state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return derivatives by values, load parameters and rest shape through what supports prescribe, from those by
@@ -197,10 +209,9 @@ class Residual:
         return Gradient(self.inputs.scene, by_values, by_load_parameters, others, rest=rest)
 
     def _derivatives(self, state: np.ndarray, motion: np.ndarray) -> Derivatives:
-        return Derivatives(
-            self._product(state, motion),
-            *_core.vjp(self._model, state, self.load_parameters, motion, self.with_rest),
-        )
+        # The core keeps the own field's part of the product from vjp.
+        by_inputs = _core.vjp(self._model, state, self.load_parameters, motion, self.with_rest)
+        return Derivatives(self._product(state, motion), *by_inputs)
 
     def _product(self, state: np.ndarray, motion: np.ndarray) -> np.ndarray:
         try:
@@ -214,6 +225,20 @@ class Residual:
         if self.with_rest and self.inputs.scene._constraints.tied:
             raise NoGradient(f"no gradient by {REST} here: the scene has an EqualDisplacement or a Periodic")
         self._model.term_energies(self.state, self.angle_branches, self.load_parameters)
+
+    @property
+    def _steps(self) -> list[float]:
+        """The steps over the shortest edge, or of an angle, that are tried one after another."""
+        too_long = 0 if self.inputs.scene.own_field is None else _TOO_LONG
+        return [_STEP * shorter for shorter in _SHORTER[too_long:]]
+
+    @property
+    def _counts(self) -> list[int]:
+        """The numbers of unknowns, values, load parameters and coordinates at rest."""
+        scene = self.inputs.scene
+        nodes = scene._bodies.n_points + len(scene._constraints.directions)
+        of_rest = 3 * nodes if self.with_rest else 0
+        return [len(self.state), scene._value_layout.size, scene._load_parameter_layout.size, of_rest]
 
     @property
     def _parts(self) -> list[slice]:

@@ -117,8 +117,8 @@ def linear_buckling(
 
     Factors are differentiable but for those of susceptible shells, by perturbation of first order: by values and load
     parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the change of the
-    equilibrium. A gradient costs two factorizations and some hundreds of evaluations of the stiffness for each factor asked
-    for; with own_field these take most of the time. Factors that equal the next one to 1e-6 have none, nor those of loads
+    equilibrium. A gradient costs some dozens of evaluations of the stiffness for each factor asked for; with own_field these
+    take most of the time. Factors that equal the next one to 1e-6 have none, nor those of loads
     with which supports move: NoGradient says so.
     Modes are arrays.
 
@@ -180,7 +180,7 @@ def linear_buckling(
     shapes, edge_rotations = mode_shapes(model, vectors[:, :modes])
     return Buckling(
         scene=scene,
-        factors=_differentiable(inputs, equilibrium, response, factors, vectors, modes),
+        factors=_differentiable(inputs, equilibrium, stiffness, response, factors, vectors, modes),
         modes=shapes,
         edge_rotations=edge_rotations,
         factorizations=2,
@@ -192,6 +192,7 @@ def linear_buckling(
 def _differentiable(
     inputs: Inputs,
     equilibrium: Equilibrium | None,
+    stiffness: Stiffness,
     response: np.ndarray,
     factors: np.ndarray,
     vectors: np.ndarray,
@@ -216,6 +217,7 @@ def _differentiable(
     moves = rate.any() and (further.any() or any(leaf.name == "support_factor" for leaf, _ in leaves))
     adjoint = BucklingAdjoint(
         here,
+        stiffness.solve,
         inputs.load_parameters,
         response,
         factors,
