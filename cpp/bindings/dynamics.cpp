@@ -394,6 +394,8 @@ void register_dynamics(py::module_& module) {
         .def_readonly("step_errors", &MotionResult::step_errors)
         .def_readonly("step_factorizations", &MotionResult::step_factorizations)
         .def_readonly("divided", &MotionResult::divided)
+        .def_readonly("gaining", &MotionResult::gaining)
+        .def_readonly("watched_energy", &MotionResult::watched_energy)
         .def_readonly("begun", &MotionResult::begun)
         .def_property_readonly("last_state", [](const MotionResult& r) { return r.last.q; })
         .def_property_readonly("last_velocity", [](const MotionResult& r) { return r.last.v; })

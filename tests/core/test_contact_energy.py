@@ -50,6 +50,25 @@ def test_fallback_steps_of_implicit_euler_are_reported() -> None:
     assert euler.fallback_steps == ()
 
 
+def test_a_motion_with_follower_loads_says_that_its_energy_was_not_watched() -> None:
+    """Push the thrown block by a pressure, whose work cannot be told from a gain of energy."""
+    scene, velocities = thrown()
+    options = {"steps": 2, "velocities": velocities, "time_step": 5e-4, "progress": False}
+    assert ms.simulate(scene, **options).energy_watched
+    upper = scene.bodies[1]
+    pushed = ms.Scene(
+        scene.bodies,
+        supports=scene.supports,
+        contacts=scene.contacts,
+        loads=[ms.Pressure(100.0, body=upper)],
+        allow_rigid_motions=True,
+    )
+    motion = ms.simulate(pushed, **options)
+    assert not motion.energy_watched and "energy in contact were not watched" in repr(motion)
+    alone = ms.Scene(upper, loads=[ms.Pressure(100.0)], allow_rigid_motions=True)
+    assert ms.simulate(alone, steps=2, time_step=5e-4, progress=False).energy_watched
+
+
 @pytest.mark.parametrize("keep", ["stages", "checkpoints"])
 def test_gradients_go_through_steps_that_implicit_euler_took(keep) -> None:
     """Compare the gradient by the initial speeds with differences along one direction."""

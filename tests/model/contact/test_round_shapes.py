@@ -86,6 +86,21 @@ def test_implicit_euler_gains_no_energy_where_balls_meet_obliquely_within_a_step
     assert divided > 0
 
 
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2(implicit_contact=True)], ids=repr)
+def test_energy_that_even_the_shortest_part_of_a_step_gains_is_told(integrator):
+    """Let two balls meet obliquely in a step so long that 1/64 of it does not resolve the impact either."""
+    a, round_a = ball_at((0, 0, 0), velocity=(1, 0, 0))
+    b, round_b = ball_at((2 * R + 5e-4, R, 0), mass=6e-3, velocity=(-1, 0, 0))
+    touch = ms.Contact(round_b, shapes=round_a, contact_stiffness=2e3)
+    scene = ms.Scene([a, b], contacts=[touch], allow_rigid_motions=True)
+    with pytest.warns(ms.StepErrorWarning, match="created energy in contact even in their shortest parts"):
+        move = ms.simulate(scene, steps=1, time_step=0.32, integrator=integrator, **EXACT)
+    assert move.energy[-1] > 1.05 * move.energy[0]  # by 12.5 %
+    assert move.energy_gain_steps == (0,) and "1 gained energy in contact" in repr(move)
+    short = ms.simulate(scene, steps=40, time_step=1e-4, integrator=integrator, **EXACT)
+    assert short.energy.max() <= 1.005 * short.energy[0] and not short.energy_gain_steps
+
+
 def test_three_balls_in_a_row_pass_on_the_velocity():
     """Let one ball hit the first of two that rest 0.2 mm apart: the last flies on alone."""
     gap, speed = 2e-4, 0.5

@@ -72,6 +72,7 @@ class Run {
         if (grown_) grown_->load_parameters = input_.adaptive.load_parameters(0, 0.0, 1.0);
         result_.start = result_.last = beginning(newton.model(), input);
         result_.begun = true;
+        result_.watched_energy = !balance_.fails_to_apply();
         if (keep.gradients) plan(keep);
         if (follower_) follower_->begin(result_.start);
     }
@@ -86,6 +87,7 @@ class Run {
     // A step, or an attempt at one.
     struct Attempt {
         bool succeeded = false, divided = false;
+        bool gained = false;  // energy in contact, in a shortest part
         Substeps substeps;
         std::vector<SubstepRecord> records;  // if they are stored
         double error = 0.0;                  // [m], the sum of those of the substeps
@@ -149,6 +151,7 @@ class Run {
         if (attempt.substeps.size() > 1 || attempt.substeps.front().dissipative)
             result_.substeps[step] = std::move(attempt.substeps);
         if (attempt.divided) result_.divided.push_back(step);
+        if (attempt.gained) result_.gaining.push_back(step);
         if (follower_) be_followed(step, attempt.records);
         if (!attempt.records.empty()) {
             for (const SubstepRecord& substep : attempt.records) result_.bytes += bytes_of(substep);
@@ -277,9 +280,12 @@ class Run {
                               result_.keep == AdjointStorage::factors || follower_, result_.reason);
             const bool calm = substep.dissipative || input_.tableau.stages == 1;  // implicit Euler already
             const bool gains_energy =
-                taken && balance_.applies() && !(calm && shortest) &&
+                taken && balance_.applies() &&
                 balance_.gains_energy(stepper_.algebra(dt, tableau), record, state, load_parameters);
-            if (taken && !gains_energy) {
+            // No shorter and no calmer part is left: it is kept, and told.
+            const bool kept = gains_energy && calm && shortest;
+            if (taken && (!gains_energy || kept)) {
+                attempt.gained |= kept;
                 attempt.error += stepper_.error();
                 attempt.substeps.push_back(substep);
                 if (keep) attempt.records.push_back(std::move(record));

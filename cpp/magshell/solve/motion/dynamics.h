@@ -86,7 +86,9 @@ struct MotionResult {
     std::vector<Index> steps_recorded;  // numbers of steps after which states were recorded
     std::vector<double> step_errors;    // [m] estimated, of the steps done
     std::vector<int> step_factorizations;  // of the steps done, and of attempts at them
-    std::vector<Index> divided;          // steps that failed as a whole, or that implicit Euler took instead
+    std::vector<Index> divided;  // steps that failed as a whole, or that implicit Euler took instead
+    std::vector<Index> gaining;  // steps that gained energy in contact even in their shortest part
+    bool watched_energy = true;  // false: contact may have gained energy, as EnergyBalance does not apply
     std::vector<MotionState> recorded;   // including the start
     std::vector<double> kinetic_energy;  // [J], of the recorded states
     std::vector<std::vector<double>>

@@ -34,13 +34,16 @@ class EnergyBalance {
         : model_(model), mass_(inertia.mass), free_bodies_(free_bodies), euler_(tableau.stages == 1) {}
 
     /// Returns true if the test applies: there is contact, and no load without potential.
-    bool applies() const { return model_.contacts().any() && !model_.capabilities().has_unsymmetric_tangent; }
+    bool applies() const { return model_.contacts().any() && !prevented(); }
+    /// Returns true if there is contact, but loads without potential prevent the test.
+    bool fails_to_apply() const { return model_.contacts().any() && prevented(); }
     /// Returns true if a step to `end` gained energy; load_parameters: load parameters at its beginning and at its stages. Leaves the model
     /// evaluated at another state.
     bool gains_energy(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
                       std::span<const LoadParameters> load_parameters);
 
   private:
+    bool prevented() const { return model_.capabilities().has_unsymmetric_tangent; }
     double kinetic(const MotionState& state) const { return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)); }
     double energy(const VectorXd& q, const Model::AngleBranches& angle_branches,
                   const LoadParameters& load_parameters);

@@ -231,6 +231,7 @@ class Scene(PlotMixin):
         self._warned_of_strain = 0.0
         self._warned_of_steps = 0.0
         self._warned_of_jumps = False
+        self._warned_of_gains = False
         self._warned_of_units: set[str] = set()
         self._cores = CoreModels(self._new_model(), self._new_model)
         self._value_layout = Layout(self._model.parameters)

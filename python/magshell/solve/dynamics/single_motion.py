@@ -45,7 +45,7 @@ from .conditions import MotionConditions
 from .differentiable_state import DifferentiableState
 from .motion_inputs import MotionInputs
 from .schedule import split_schedules
-from .step_errors import warn_of_steps
+from .step_errors import warn_of_gains, warn_of_steps
 from .trajectory import MotionState, Trajectory
 
 
@@ -200,6 +200,7 @@ def run(
     warn_of_obtuse_faces(scene, positions, motion_inputs.inputs.values.all_shells, bending[most], where)
     _warn(result)
     warn_of_steps(result)
+    warn_of_gains(result)
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         _warn_of_fields(result)
     except KeyboardInterrupt as stopped:
@@ -312,6 +313,8 @@ def _trajectory(motion_inputs: MotionInputs, found, wall_time: float, known=None
         fallback_steps=tuple(
             step for step, parts in found.substeps.items() if any(calm for _, _, calm in parts)
         ),
+        energy_gain_steps=tuple(found.gaining),
+        energy_watched=found.watched_energy,
         time_steps=np.array(found.time_steps),
         step_errors=np.array(found.step_errors),
         end=MotionState(

@@ -99,6 +99,20 @@ def warn_of_steps(move: Trajectory) -> None:
     remember(scene, _warned_of_steps=badness)
 
 
+def warn_of_gains(move: Trajectory) -> None:
+    """Warn once per scene of steps that created energy in contact even in their shortest part."""
+    if not move.energy_gain_steps or move.scene._warned_of_gains:
+        return
+    gaining = move.energy_gain_steps
+    warning = StepErrorWarning(
+        f"{len(gaining)} of the motion's steps created energy in contact even in their shortest parts, by implicit Euler "
+        f"(the first is step {gaining[0]}): the motion after them is too fast. Take shorter steps.",
+        move,
+    )
+    warnings.warn(warning, stacklevel=callers_level())
+    remember(move.scene, _warned_of_gains=True)
+
+
 def _rounded(length: float) -> float:
     """Return a length rounded down to one digit."""
     unit = 10.0 ** np.floor(np.log10(length))

@@ -144,6 +144,9 @@ class Trajectory(AnimateMixin, OfOneBody):
     substeps: {step: number of parts into which it was divided}.
     fallback_steps: the steps that implicit Euler took, wholly or in part, because the integrator would have created
         energy in contact.
+    energy_gain_steps: the steps that created energy in contact even in their shortest part; ms.StepErrorWarning warns.
+    energy_watched: False if there is contact and loads have no potential (pressure, torques of joints): steps that create
+        energy in contact are not found then.
     end: the last state, from which another simulation continues. bytes: memory of the data stored for gradients.
     """
 
@@ -163,6 +166,8 @@ class Trajectory(AnimateMixin, OfOneBody):
     steps_done: int
     substeps: dict[int, int]
     fallback_steps: tuple[int, ...]
+    energy_gain_steps: tuple[int, ...]
+    energy_watched: bool
     time_steps: np.ndarray
     step_errors: np.ndarray
     end: MotionState
@@ -340,6 +345,13 @@ class Trajectory(AnimateMixin, OfOneBody):
         stopped = "" if self.steps_done == self.steps else f" of {self.steps}"
         halved = f", {len(self.substeps)} of them in parts" if self.substeps else ""
         halved += f", {len(self.fallback_steps)} by implicit Euler" if self.fallback_steps else ""
+        gains = self.energy_gain_steps
+        halved += f", {len(gains)} gained energy in contact" if gains else ""
+        watched = (
+            ""
+            if self.energy_watched
+            else "  gains of energy in contact were not watched for, because of follower loads\n"
+        )
         strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
         crossings = describe_self_intersections(self.scene.mesh, detached(self.positions))
         taken = len(self.time_steps)
@@ -353,6 +365,7 @@ class Trajectory(AnimateMixin, OfOneBody):
             f"  {describe_steps(self)}\n"
             f"  {describe_strains(self, strain)}\n"
             f"  {crossings}\n"
+            f"{watched}"
             f"  {self.iterations} iterations, {self.factorizations} factorizations\n"
             f"  {self.wall_time:.3g} s, {a_step:.3g} ms a step; for gradients: {self.adjoint_storage}, "
             f"{self.bytes / 1e6:.3g} MB"
