@@ -74,7 +74,7 @@ class Adaptive:
         time are given at the grid's times, and no step goes beyond one. Choose it as long as a step may be, and so that
         load parameters have kinks and jumps only at these times. A tensor has a gradient.
     tolerance: of the error of the positions after one step, m, as the root mean square over vertices (that of
-        Trajectory.step_errors). By default 1e-4 of the extent, the diagonal of the largest body's bounding box; the error of
+        Trajectory.step_errors). By default 1e-4 of the extent, the longest side of a body's bounding box; the error of
         a few hundred steps together is then a few percent of the extent at most.
     max_halvings: the shortest step is interval / 2^max_halvings. At most 20, and so many that this is at least 1e-12 s,
         which is the default.

@@ -8,6 +8,7 @@ import pytest
 from chosen_steps import BOUNCE, bounce, bounces, bouncing_plate, changes, distance, noise, swinging_strip
 
 import magshell as ms
+from magshell.solve.dynamics.step_errors import tolerance_of
 
 INTEGRATORS = [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()]
 
@@ -171,9 +172,10 @@ def test_tolerance_that_cannot_be_reached_leaves_the_motion_until_there() -> Non
 
 
 def test_default_tolerance_is_a_fraction_of_the_extent() -> None:
-    extent = np.hypot(0.1, 0.02)
+    extent = 0.1  # the longest side
     move, given = (swinging_strip(2, ms.Adaptive(0.02, tolerance)) for tolerance in (None, 1e-4 * extent))
     np.testing.assert_array_equal(move.time_steps, given.time_steps)
+    assert tolerance_of(move.scene, ms.Adaptive(0.02)) == pytest.approx(1e-4 * extent, rel=1e-12)
 
 
 def test_tolerance_below_round_off_is_refused() -> None:

@@ -88,13 +88,13 @@ def test_coarse_steps_of_a_swing_are_warned_of() -> None:
         ms.StepErrorWarning, match=r"more than 1 % of the extent .* Take steps of 0.0\d* s"
     ) as caught:
         coarse = swinging_strip(10, 0.02, ms.ImplicitEuler())
-    assert coarse.step_errors.max() > 0.01 * np.hypot(0.1, 0.02)
+    assert coarse.step_errors.max() > 0.01 * 0.1  # of the longest side
     assert caught[0].message.last_good is not None and "% of the extent" in repr(coarse)
     enough = float(str(caught[0].message).split("Take steps of ")[1].split(" s")[0])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fine = swinging_strip(round(0.2 / enough), enough, ms.ImplicitEuler())
-    assert fine.step_errors.max() < 0.01 * np.hypot(0.1, 0.02)
+    assert fine.step_errors.max() < 0.01 * 0.1
 
 
 def test_coarse_steps_are_warned_of_once_for_each_scene() -> None:
@@ -124,6 +124,19 @@ def test_steps_that_take_many_factorizations_are_warned_of() -> None:
         if caught:
             assert "12 of 20 steps took more than 20 factorizations" in str(caught[0].message)
             assert "Take steps of 0.0005 s" in str(caught[0].message)
+    wrong = replace(move, step_errors=np.full(20, 1.5 * 0.01 * 0.1))  # told even after the other warning
+    with pytest.warns(ms.StepErrorWarning, match="more than 1 % of the extent"):
+        warn_of_steps(wrong)
+
+
+@pytest.mark.parametrize(
+    "length, rounded", [(0.3, 0.3), (0.7, 0.7), (6e-4, 6e-4), (2.9e-3, 2e-3), (1.0, 1.0)]
+)
+def test_lengths_are_rounded_down_to_one_digit(length: float, rounded: float) -> None:
+    """Check that 0.3, whose quotient by 0.1 is 2.9999..., stays 0.3."""
+    from magshell.solve.dynamics.step_errors import _rounded
+
+    assert _rounded(length) == pytest.approx(rounded, rel=1e-12)
 
 
 def motion_in_parts():

@@ -230,6 +230,7 @@ class Scene(PlotMixin):
         self._warned_of_obtuse_faces = False
         self._warned_of_strain = 0.0
         self._warned_of_steps = 0.0
+        self._warned_of_dear_steps = False
         self._warned_of_jumps = False
         self._warned_of_gains = False
         self._warned_of_units: set[str] = set()

@@ -21,11 +21,16 @@ DEFAULT_TOLERANCE = 1e-4  # [-] of the extent; see test_default_tolerance_is_a_f
 MANY_FACTORIZATIONS = 20  # of one step; see test_steps_that_take_many_factorizations_are_warned_of
 _OFTEN = 0.1  # [-] of all steps; see test_steps_that_take_many_factorizations_are_warned_of
 _FEWEST = 3  # steps with many factorizations: one or two may be an impact; see the same test
-_ROUND_OFF = 1e-10  # [-] of the largest coordinate; see test_tolerance_below_round_off_is_refused
+_ROUND_OFF = (
+    1e-10  # [-] of the largest coordinate or the extent; see test_tolerance_below_round_off_is_refused
+)
 
 
 def extent_of(scene: Scene) -> float:
-    """Return the diagonal of the largest body's bounding box at rest [m]; without shells and solids, of all rigid bodies."""
+    """Return the longest side of a body's bounding box at rest [m].
+
+    Without shells and solids it is the diagonal of the box around the points of all rigid bodies.
+    """
     if scene._bodies.extent > 0.0:
         return scene._bodies.extent
     points = scene._model.points(scene._model.rest_state())
@@ -46,8 +51,8 @@ def tolerance_of(scene: Scene, adaptive: Adaptive | None) -> float:
     reach = max(extent, float(np.abs(scene.mesh.rest_positions).max(initial=0.0)))
     if adaptive.tolerance < _ROUND_OFF * reach:
         raise ValueError(
-            f"tolerance [m] must be at least {_ROUND_OFF * reach:.3g} m, {_ROUND_OFF:g} of the largest coordinate, got "
-            f"{adaptive.tolerance:g}: round-off and the solver's tolerance make errors of that size"
+            f"tolerance [m] must be at least {_ROUND_OFF * reach:.3g} m, {_ROUND_OFF:g} of the largest coordinate or the "
+            f"extent, got {adaptive.tolerance:g}: round-off and the solver's tolerance make errors of that size"
         )
     return adaptive.tolerance
 
@@ -65,7 +70,10 @@ def describe_steps(move: Trajectory) -> str:
 
 
 def warn_of_steps(move: Trajectory) -> None:
-    """Warn once per scene that steps are too long, and again whenever their errors have doubled since."""
+    """Warn that errors of steps are large, or that many steps took many factorizations.
+
+    A scene warns of each once, and again whenever the largest error has doubled since.
+    """
     scene, errors = move.scene, move.step_errors
     extent = extent_of(scene)
     if not len(errors) or extent == 0.0:
@@ -75,12 +83,14 @@ def warn_of_steps(move: Trajectory) -> None:
     dear = np.flatnonzero(move._step_factorizations > MANY_FACTORIZATIONS)
     were_divided = len(errors) > move.steps  # by ms.Adaptive or by the caller
     is_dear = len(dear) >= _FEWEST and len(dear) > _OFTEN * len(errors) and not were_divided
-    badness = max(errors[worst] / limit, float(is_dear))
-    if not badness >= 1.0 or badness < 2.0 * scene._warned_of_steps:
+    badness, told = errors[worst] / limit, scene._warned_of_steps
+    is_wrong = badness >= max(1.0, 2.0 * told)
+    if not is_wrong and (not is_dear or scene._warned_of_dear_steps):
         return
     length = move.time_steps[worst]
-    if errors[worst] >= limit:
-        # The error of a step across an impact is of first order by any integrator.
+    if is_wrong:
+        # The error of a step across an impact is proportional to the step by any integrator. Without contact it falls with
+        # one order more than that of the integrator; that one is left out, as steps with large errors are too long for it.
         order = 1 if scene.contacts else len(move.integrator._times)
         enough = _rounded(
             float((move.time_steps * (limit / np.maximum(errors, limit)) ** (1.0 / order)).min())
@@ -96,7 +106,10 @@ def warn_of_steps(move: Trajectory) -> None:
     if were_divided:
         advice = f"Take a tolerance of at most {limit:.2g} m, or steps of {enough:g} s"
     warnings.warn(StepErrorWarning(f"the motion's {what}. {advice}.", move), stacklevel=callers_level())
-    remember(scene, _warned_of_steps=badness)
+    if is_wrong:
+        remember(scene, _warned_of_steps=badness)
+    else:
+        remember(scene, _warned_of_dear_steps=True)
 
 
 def warn_of_gains(move: Trajectory) -> None:
@@ -114,6 +127,6 @@ def warn_of_gains(move: Trajectory) -> None:
 
 
 def _rounded(length: float) -> float:
-    """Return a length rounded down to one digit."""
+    """Return a length rounded down to one digit, but for round-off."""
     unit = 10.0 ** np.floor(np.log10(length))
-    return float(np.floor(length / unit) * unit)
+    return float(np.floor(length / unit * (1.0 + 1e-9)) * unit)
