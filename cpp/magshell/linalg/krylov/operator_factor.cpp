@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <string>
+#include <sstream>
 #include <vector>
 
 #include "magshell/core/errors.h"
@@ -14,15 +14,15 @@
 namespace magshell {
 namespace {
 
-// [-] Residual of solves, relative to the right-hand side, the largest one that is accepted, and iterations; fixed by
+// [-] Residual of solves relative to the right-hand side, and the largest one that is accepted; fixed by
 // test_operator_factor_solves_and_counts_as_the_dense_matrix.
 constexpr double tight = 1e-13, acceptable = 1e-9;
 constexpr int most_iterations = 300;  // see test_operator_factor_solves_and_counts_as_the_dense_matrix
-// [-] Tolerance of a solve above which a product with A after a solve with A is taken for the identity; fixed by
+// [-] Tolerance of a solve above which a product with A right after a solve with A is taken for the identity; fixed by
 // test_operator_factor_solves_and_counts_as_the_dense_matrix.
 constexpr double rounding_matters = 1e-10;
 
-// [-] Tolerance of a solve from which on rough products do; see test_solves_with_a_large_tolerance_take_rough_products.
+// [-] Tolerance of a solve from which on rough products suffice; see test_solves_with_a_large_tolerance_take_rough_products.
 constexpr double rough_suffices = 1e-5;
 // [-] Distance of the nearest eigenvalue from the bound, over the largest one, from which on a count with rough products is sure: ten times
 // the error of these; see test_solves_with_a_large_tolerance_take_rough_products.
@@ -32,16 +32,18 @@ constexpr double clear_margin = 1e-2;
 struct Count {
     Index below = 0;       // eigenvalues below the bound
     bool settled = false;  // whether the next one is known to lie above it
-    double margin = 0.0;   // [-] distance of the nearest one from the bound, over the size of the largest one
+    double margin =
+        0.0;  // [-] distance of the nearest one from the bound, over the size of the largest one, or over 1
 };
 
-// Returns whether Lanczos' method from a random start has missed no eigenvalue below `bound`, but with a probability of 1e-3. The lowest of
-// n eigenvalues is below the lowest Ritz value after k steps by more than the part e of their spread with a probability below
+// Returns whether Lanczos' method has missed no eigenvalue below `bound`, but with an estimated probability of 1e-3. From a start that is
+// uniform on the sphere, the lowest of n eigenvalues is below the lowest Ritz value after k steps by more than the part e of their
+// spread with a probability below
 //
 //   1.648 sqrt(n) exp(-(2 k - 1) sqrt(e))                      [Kuczynski92]
 //
-// Ritz values at both ends that are known take a step each, and the others have a smaller spread. An error of a Ritz value is
-// `length` times the last component of its vector.
+// The start here is uniform in each unknown. Ritz values at both ends that are known take a step each, and the others have a smaller
+// spread. An error of a Ritz value is `length` times the last component of its vector.
 bool missed_none(const SymmetricEigen& ritz, double length, Index below, double bound, Index n) {
     // [-] Probability, and the constant of its bound; fixed by test_a_strip_beyond_its_buckling_load_is_not_called_stable.
     constexpr double probability = 1e-3, constant = 1.648;
@@ -54,7 +56,7 @@ bool missed_none(const SymmetricEigen& ritz, double length, Index below, double 
     };
     for (Index low = below; low < steps; ++low) {
         if (low > below && !is_certain(low - 1)) return false;
-        for (Index high = 0; low + high < steps; ++high) {
+        for (Index high = 0; low + high < steps && (high == 0 || is_certain(steps - high)); ++high) {
             const double part = (ritz.values[low] - bound) / (ritz.values[steps - 1 - high] - bound);
             if (double(2 * (steps - low - high) - 1) * std::sqrt(part) >= needed) return true;
         }
@@ -90,6 +92,7 @@ Count count_below(const Factor& positive, const VectorXd& diagonal, const Operat
         images.push_back(z / length);
         vectors.push_back(v / length);
         z = product(vectors.back());
+        if (!z.allFinite()) return {};
         products.push_back(z.dot(vectors.back()));
         for (int sweep = 0; sweep < 2; ++sweep)
             for (std::size_t k = vectors.size(); k-- > 0;) z -= z.dot(vectors[k]) * images[k];
@@ -193,10 +196,12 @@ void OperatorFactor::solve_approximately(VectorXd& rhs, double tolerance) const 
         sparse_->solve(x);
     };
     const GmresReport report = gmres(product, precondition, rhs, {tolerance, most_iterations});
-    if (!report.converged && !(report.residual <= std::max(tolerance, acceptable)))
-        throw InvalidInput("a linear solve with the own field did not converge: its relative residual is " +
-                           std::to_string(report.residual) + " after " + std::to_string(report.iterations) +
-                           " iterations");
+    if (!report.converged && !(report.residual <= std::max(tolerance, acceptable))) {
+        std::ostringstream message;
+        message << "a linear solve with the own field did not converge: its relative residual is "
+                << report.residual << " after " << report.iterations << " iterations";
+        throw InvalidInput(message.str());
+    }
 }
 
 void OperatorFactor::solve(Eigen::Ref<Eigen::MatrixXd> rhs) const {

@@ -1,9 +1,10 @@
 // OperatorFactor: a factorization of a sparse matrix A plus a symmetric operator H that is known by its products only, K = A + H.
 //
-// Solves use GMRES, preconditioned with A. The inertia is that of K. If A is positive definite, the negative eigenvalues of K are those of
-// A^-1 H below -1, which Lanczos' method finds in the inner product of A (Parlett, The Symmetric Eigenvalue Problem, 15.11). A multiple
-// eigenvalue is counted once, so the number of negative pivots is a lower bound, and zero only if there are none. Otherwise A is
-// replaced by A plus a multiple of its diagonal that makes it positive definite.
+// Solves use GMRES, preconditioned with A. The inertia is that of K. If A is positive definite, K has as many negative eigenvalues as A^-1 H
+// has below -1, which Lanczos' method finds in the inner product of A (Parlett, The Symmetric Eigenvalue Problem, 15.11). A multiple
+// eigenvalue is counted once, so the number of negative pivots is a lower bound. If the count is not settled, it is reported as one at
+// least, with one perturbed pivot. If A is not positive definite, a multiple of its diagonal that makes it so is added to A and
+// subtracted from H.
 #pragma once
 
 #include <memory>
@@ -20,7 +21,7 @@ class OperatorFactor final : public Factor {
 
     explicit OperatorFactor(std::unique_ptr<Factor> sparse);
 
-    /// Sets H until it is set again; an empty function is zero. rough: nearly the same product in less time, for solves with a large
+    /// Sets H until it is set again; two empty functions are zero. rough: nearly the same product in less time, for solves with a large
     /// tolerance and for counts that are far from a change. is_constant: whether the product stays the same until then.
     void set_operator(Operator product, Operator rough, bool is_constant = true) {
         operator_ = RepeatedOperator(std::move(product), size(), is_constant);
@@ -45,8 +46,8 @@ class OperatorFactor final : public Factor {
     std::size_t own_bytes() const override { return sparse_->own_bytes(); }
 
   private:
-    /// Returns a positive definite factorization of A plus a multiple of its diagonal, which replaces `values`, and the multiple times
-    /// the diagonal; nullptr if there is none.
+    /// Returns a positive definite factorization of A plus a multiple of its diagonal; nullptr if there is none. values: of A. shift: set
+    /// to that multiple of the diagonal.
     std::unique_ptr<Factor> shifted(const LargeVector<double>& values, VectorXd& shift) const;
 
     std::unique_ptr<Factor> sparse_;

@@ -1,5 +1,6 @@
-// RepeatedOperator: a symmetric operator that becomes a dense matrix once it has been multiplied with as often as it has columns. So all
-// products together take at most twice the time of the shorter way, and many, as eigenvalue problems need, become cheap.
+// RepeatedOperator: a symmetric operator that becomes a dense matrix once it has been multiplied with as often as it has columns. Single
+// products and those for the matrix then take the same time, so all together take at most twice that of the better choice made in advance.
+// The matrix sums in another order: later products differ from earlier ones by round-off.
 #pragma once
 
 #include <functional>
@@ -33,9 +34,9 @@ class RepeatedOperator {
         {
             const std::lock_guard lock(state.changes);
             if (state.is_constant && state.size <= most_dense && state.products++ == state.size) state.fill();
-            if (state.matrix.size() == 0) return state.product(x);
         }
-        return state.matrix * x;
+        if (is_dense()) return state.matrix * x;
+        return state.product(x);
     }
 
   private:
