@@ -98,6 +98,7 @@ class OwnField {
     struct Neighbours {
         std::vector<std::array<Index, 2>> elements, sides;
         std::shared_ptr<const Trees> trees;
+        bool is_rough = false;  // for products that need not be exact. plain-words: ok, of products
     };
 
     /// Throws InvalidInput if more than two faces meet at an edge.

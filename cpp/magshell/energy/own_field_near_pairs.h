@@ -64,6 +64,13 @@ class PointArrays {
 
 /// G and its derivatives with respect to the nodes of both elements and to h n.
 template <class T>
+struct PairDerivatives {
+    T value{};
+    Triple<T> nodes[2][3], levels[2];
+};
+
+/// The sums of a pair of which one is a triangle; those of edges are in energy/own_field_edge_pairs.h.
+template <class T>
 class PairMean {
   public:
     using Lanes = typename LanesOf<T>::Type;
@@ -122,9 +129,14 @@ class PairMean {
         }
     }
 
-    T value() const { return LanesOf<T>::sum(value_); }
-    Triple<T> by_node(int side, int node) const { return sum(nodes_[side][node]); }
-    Triple<T> by_level(int side) const { return sum(levels_[side]); }
+    PairDerivatives<T> operator()() const {
+        PairDerivatives<T> out{LanesOf<T>::sum(value_), {}, {}};
+        for (int side = 0; side < 2; ++side) {
+            for (int node = 0; node < 3; ++node) out.nodes[side][node] = sum(nodes_[side][node]);
+            out.levels[side] = sum(levels_[side]);
+        }
+        return out;
+    }
 
   private:
     static Triple<Lanes> none() { return {LanesOf<T>::zero(), LanesOf<T>::zero(), LanesOf<T>::zero()}; }

@@ -106,7 +106,8 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
 OwnField::Neighbours OwnField::rough(const double* q, const Neighbours& near) const {
     constexpr double accuracy = 1e-3;  // [-] see test_rough_products_are_close_to_exact_ones
     Neighbours rough = near;
-    if (n_points() > most_direct_rough && accuracy_ > 0.0)
+    rough.is_rough = n_points() > most_direct_rough && accuracy_ > 0.0;
+    if (rough.is_rough)
         rough.trees = trees(positions<double>(q, nullptr), Targets::sources, std::max(accuracy, accuracy_));
     return rough;
 }

@@ -1,4 +1,4 @@
-// SimdDual: a dual number in each lane of a SIMD vector; and LanesOf<T>: the lanes of numbers or of dual numbers, loaded from arrays of
+// DualLanes: a dual number in each lane of a SIMD vector; and LanesOf<T>: the lanes of numbers or of dual numbers, loaded from arrays of
 // values and of rates.
 #pragma once
 
@@ -9,33 +9,35 @@
 
 namespace magshell {
 
-struct SimdDual {
-    SimdDouble value{0.0}, rate{0.0};
+template <class Lanes>
+struct DualLanes {
+    Lanes value{}, rate{};
 
-    SimdDual() = default;
-    SimdDual(const SimdDouble& v, const SimdDouble& r) : value(v), rate(r) {}
-    SimdDual& operator+=(const SimdDual& b) {
+    DualLanes() = default;
+    DualLanes(const Lanes& v, const Lanes& r) : value(v), rate(r) {}
+    DualLanes& operator+=(const DualLanes& b) {
         value += b.value;
         rate += b.rate;
         return *this;
     }
-    SimdDual& operator-=(const SimdDual& b) {
+    DualLanes& operator-=(const DualLanes& b) {
         value -= b.value;
         rate -= b.rate;
         return *this;
     }
-    friend SimdDual operator+(const SimdDual& a, const SimdDual& b) {
+    friend DualLanes operator+(const DualLanes& a, const DualLanes& b) {
         return {a.value + b.value, a.rate + b.rate};
     }
-    friend SimdDual operator-(const SimdDual& a, const SimdDual& b) {
+    friend DualLanes operator-(const DualLanes& a, const DualLanes& b) {
         return {a.value - b.value, a.rate - b.rate};
     }
-    friend SimdDual operator-(const SimdDual& a) { return {-a.value, -a.rate}; }
-    friend SimdDual operator*(const SimdDual& a, const SimdDual& b) {
+    friend DualLanes operator-(const DualLanes& a) { return {-a.value, -a.rate}; }
+    friend DualLanes operator*(const DualLanes& a, const DualLanes& b) {
         return {a.value * b.value, a.rate * b.value + a.value * b.rate};
     }
-    friend SimdDual operator*(const SimdDouble& a, const SimdDual& b) { return {a * b.value, a * b.rate}; }
+    friend DualLanes operator*(const Lanes& a, const DualLanes& b) { return {a * b.value, a * b.rate}; }
 };
+using SimdDual = DualLanes<SimdDouble>;
 
 /// Returns the sum of all lanes, in their order.
 inline double sum_of_lanes(const SimdDouble& a) {
