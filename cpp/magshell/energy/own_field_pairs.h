@@ -44,7 +44,7 @@ inline SimdDouble inverse_root(const SimdDouble& a) {
 #endif
 }
 
-/// A source point, or the sums at a point.
+/// A source point.
 template <class T>
 struct SourcePoint {
     Triple<T> at;       // p [m]

@@ -2,11 +2,12 @@
 //
 //   R_l^m(r) = r^l P_l^m(cos theta) e^(i m phi) / (l + m)!       I_l^m(r) = (l - m)! P_l^m(cos theta) e^(i m phi) / r^(l+1)
 //
-// For m < 0 both are (-1)^m times the conjugate of those for -m. Sums over l and -l <= m <= l        [Epton95]:
+// with P_l^m without the factor (-1)^m, so that R_1^1 = (x + i y) / 2. For m < 0 both are (-1)^m times the conjugate of those for -m.
+// Sums over all l and -l <= m <= l, and over k and n where the harmonics exist [Epton95]:
 //
 //   1/|a - b|   = sum conj R_l^m(b) I_l^m(a),   |b| < |a|
 //   R_l^m(a + b) = sum R_k^n(a) R_(l-k)^(m-n)(b)
-//   I_l^m(a + b) = sum (-1)^k conj R_k^n(b) I_(l+k)^(m+n)(a)
+//   I_l^m(a + b) = sum (-1)^k conj R_k^n(b) I_(l+k)^(m+n)(a),   |b| < |a|
 #pragma once
 
 #include <vector>
@@ -62,6 +63,7 @@ void set_regular_harmonics(int degree, const Triple<Lanes>& r, const Lanes& one,
 /// Complex numbers for -l <= m <= l <= degree in each lane, where those for -m are (-1)^m times the conjugate of those for m.
 class FullHarmonics {
   public:
+    /// One number more than needed: sums of two successive m load it.
     explicit FullHarmonics(int degree)
         : degree_(degree), numbers_(full_index(degree, degree) + 2, {SimdDouble(0.0), SimdDouble(0.0)}) {}
 
@@ -78,7 +80,7 @@ class FullHarmonics {
         for (int l = 0; l <= degree_; ++l)
             for (int m = 0; m <= l; ++m) set(l, m, half[half_index(l, m)]);
     }
-    /// Sets conj R_l^m(r).
+    /// Sets conj R_l^m(r). half: harmonic_count(degree) numbers to work in.
     void set_conjugate_regular(const Triple<SimdDouble>& r, std::vector<ComplexLanes<SimdDouble>>& half) {
         set_regular_harmonics(degree_, r, SimdDouble(1.0), SimdDouble(0.0), half.data());
         for (ComplexLanes<SimdDouble>& each : half) each.im = -each.im;

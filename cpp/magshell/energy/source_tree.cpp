@@ -12,12 +12,20 @@ namespace {
 
 // [-] Sum of the radii of two distant boxes over their distance; see test_tree_sums_agree_with_direct_ones.
 constexpr double opening = 0.6;
-// [-] Digits that a degree adds, over those for points on the spheres around their boxes, towards each other; see
-// test_tree_sums_agree_with_direct_ones.
-constexpr double typical = 1.7;
+// [-] Digits that a degree adds, over those for points on the spheres around their boxes, towards each other: for typical points, which decide
+// up to an accuracy `usual`, and for the few that are nearest to those, which decide beyond. See test_tree_sums_agree_with_direct_ones
+// and test_tree_sums_of_a_flat_sheet_agree_with_direct_ones.
+constexpr double typical = 1.7, nearest = 1.2, usual = 1e-6;
+// [-] Sides and radii of boxes that differ by less than this factor are taken for equal, and coordinates within a box for equal in cells of
+// this part of its side, counted from an odd offset. On a regular mesh they are equal but for round-off, which would change the tree,
+// and with it forces by the accuracy, between nearly equal states: Newton's method would not converge. See
+// test_newton_converges_on_a_regular_mesh.
+constexpr double alike = 1.0137, cell = 1e-4, offset = 0.377;
 
 int degree_for(double accuracy) {
-    return static_cast<int>(std::ceil(std::log(accuracy) / (typical * std::log(opening))));
+    const double first = std::max(accuracy, usual);
+    return static_cast<int>(std::ceil(std::log(first) / (typical * std::log(opening)) +
+                                      std::log(accuracy / first) / (nearest * std::log(opening))));
 }
 
 }  // namespace
@@ -58,12 +66,18 @@ Index SourceTree::split(Index first, Index last, Index parent, const std::vector
     boxes_.push_back(box);
     // A leaf has about as many points as an expansion has terms.
     if ((last - first) * group_size_ <= harmonic_count(degree_) || last - first < 2) return number;
+    const Vec3 sides = high - low;
     int longest = 0;
-    (high - low).maxCoeff(&longest);
+    for (int axis = 1; axis < 3; ++axis)
+        if (sides[axis] > alike * sides[longest]) longest = axis;
+    const double side = std::max(sides[longest], std::numeric_limits<double>::min());
+    const auto cell_of = [&](Index group) {
+        return std::floor((middles_[group][longest] - low[longest]) / (cell * side) + offset);
+    };
     const Index middle = first + (last - first) / 2;
     std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last,
                      [&](Index a, Index b) {
-                         const double at_a = middles_[a][longest], at_b = middles_[b][longest];
+                         const double at_a = cell_of(a), at_b = cell_of(b);
                          return at_a < at_b || (at_a == at_b && a < b);
                      });
     const Index left = split(first, middle, number, points);
@@ -90,8 +104,9 @@ void pair_boxes(const SourceTree& targets, const SourceTree& sources, BoxPairs& 
         } else if (target.is_leaf() && source.is_leaf()) {
             of_targets.near[a].push_back(b);
             of_sources.near[b].push_back(a);
-        } else if (source.is_leaf() || (!target.is_leaf() && (target.radius > source.radius ||
-                                                              (target.radius == source.radius && a <= b)))) {
+        } else if (source.is_leaf() ||
+                   (!target.is_leaf() && (target.radius > alike * source.radius ||
+                                          (source.radius <= alike * target.radius && a <= b)))) {
             // Ties are broken so that in one tree a box sees another if that sees it.
             for (const Index child : target.children) open.push_back({child, b});
         } else {

@@ -1,8 +1,8 @@
 // SourceTree: balls of magnetic source points, for sums over distant points whose time grows little faster than their number.
 //
 // Points belong to groups, those of one edge or of one face, which stay together. The groups of a box are split at the median along the
-// longest side of the box. Distant boxes see each other through expansions in solid harmonics about their centers
-// (energy/solid_harmonics.h), up to a degree p:
+// longest side of the box; differences of round-off do not change the boxes of a regular mesh. Distant boxes see each other through
+// expansions in solid harmonics about their centers (energy/solid_harmonics.h), up to a degree p:
 //
 //   sum_j q_j / |c + u - p_j|  =  sum L_l^m conj R_l^m(u),      L_l^m = (-1)^l sum M_k^n I_(l+k)^(m+n)(c - c'),  l + k <= p,
 //                                                               M_k^n = sum_j q_j conj R_k^n(p_j - c')

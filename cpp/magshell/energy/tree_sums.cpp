@@ -78,8 +78,8 @@ void each_lanes(const std::vector<Index>& boxes, const Body& body) {
                  [&](int part) { body(boxes.data() + part * width, std::min(width, count - part * width)); });
 }
 
-// Returns the vectors from boxes to their parents, or back.
-Triple<SimdDouble> to_parents(const SourceTree& tree, const Index* boxes, int count) {
+// Returns the vectors from the centers of the parents to those of the boxes.
+Triple<SimdDouble> from_parents(const SourceTree& tree, const Index* boxes, int count) {
     Triple<SimdDouble> out{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
     for (int lane = 0; lane < count; ++lane) {
         const SourceTree::Box& box = tree.boxes()[boxes[lane]];
@@ -98,7 +98,7 @@ void add_product(const Complex& a, const Complex& b, Complex& out) {
     out.im += a.im * b.re;
 }
 
-// M_l^m += sum conj R_k^n M'_(l-k)^(m-n), about the center of the parent
+// M_l^m = sum conj R_k^n M'_(l-k)^(m-n), about the center of the parent
 void shift_sources(int degree, const FullHarmonics& regular, const FullHarmonics& from, Harmonics& to) {
     for (int l = 0; l <= degree; ++l)
         for (int m = 0; m <= l; ++m) {
@@ -110,7 +110,7 @@ void shift_sources(int degree, const FullHarmonics& regular, const FullHarmonics
         }
 }
 
-// L_l^m += sum L'_k^n conj R_(k-l)^(n-m), about the center of the child
+// L_l^m = sum L'_k^n conj R_(k-l)^(n-m), about the center of the child
 void shift_potentials(int degree, const FullHarmonics& regular, const FullHarmonics& from, Harmonics& to) {
     for (int l = 0; l <= degree; ++l)
         for (int m = 0; m <= l; ++m) {
@@ -122,7 +122,8 @@ void shift_potentials(int degree, const FullHarmonics& regular, const FullHarmon
         }
 }
 
-// L_l^m += (-1)^l sum M_k^n I_(l+k)^(m+n). Two successive m share the loads of M, and their sums do not wait for each other.
+// L_l^m += (-1)^l sum M_k^n I_(l+k)^(m+n) for l + k <= p, so that two boxes act on each other alike. Two successive m share the loads of M,
+// and their sums do not wait for each other; the second one is not used where m = l.
 void add_potentials(int degree, const FullHarmonics& irregular, const FullHarmonics& from, Harmonics& to) {
     const SimdDouble zero(0.0);
     for (int l = 0; l <= degree; ++l)
@@ -238,7 +239,7 @@ Expansions<T> sources_of(const SourceTree& tree, const std::vector<SourcePoint<T
                 Index children[width];
                 for (int lane = 0; lane < boxes_count; ++lane)
                     children[lane] = tree.boxes()[boxes[lane]].children[side];
-                regular.set_conjugate_regular(to_parents(tree, children, boxes_count), half);
+                regular.set_conjugate_regular(from_parents(tree, children, boxes_count), half);
                 for (int c = 0; c < sources.channels(); ++c) {
                     sources.load(c, children, boxes_count, half, child_sources);
                     shift_sources(degree, regular, child_sources, half);
@@ -261,13 +262,13 @@ Expansions<T> potentials_of(const SourceTree& targets, const SourceTree& sources
         const std::vector<Index>& distant = pairs.distant[number];
         if (distant.empty()) return;
         const Vec3& center = targets.boxes()[number].center;
-        Harmonics half(count), sums(count * from.channels(), Complex{SimdDouble(0.0), SimdDouble(0.0)});
+        Harmonics half(count);
         FullHarmonics irregular(degree), of_sources(degree);
         std::vector<Harmonics> by_channel(from.channels(),
                                           Harmonics(count, {SimdDouble(0.0), SimdDouble(0.0)}));
         for (std::size_t first = 0; first < distant.size(); first += width) {
             const int boxes_count = static_cast<int>(std::min<std::size_t>(width, distant.size() - first));
-            Triple<SimdDouble> way;
+            Triple<SimdDouble> way;  // spare lanes repeat the last box, without sources
             for (int lane = 0; lane < width; ++lane) {
                 const Index b = distant[first + std::min(lane, boxes_count - 1)];
                 const Vec3 apart = center - sources.boxes()[b].center;
@@ -294,7 +295,7 @@ Expansions<T> potentials_of(const SourceTree& targets, const SourceTree& sources
             Index parents[width];
             for (int lane = 0; lane < boxes_count; ++lane)
                 parents[lane] = targets.boxes()[boxes[lane]].parent;
-            regular.set_conjugate_regular(to_parents(targets, boxes, boxes_count), half);
+            regular.set_conjugate_regular(from_parents(targets, boxes, boxes_count), half);
             for (int c = 0; c < potentials.channels(); ++c) {
                 potentials.load(c, parents, boxes_count, half, of_parents);
                 shift_potentials(degree, regular, of_parents, half);
@@ -304,7 +305,8 @@ Expansions<T> potentials_of(const SourceTree& targets, const SourceTree& sources
     return potentials;
 }
 
-// The real factors of R_l^m in a potential and its gradient: each is a sum of re Re R + im Im R over 0 <= m <= l.
+// The real factors of R_l^m in a potential and its gradient: each is a sum of re Re R + im Im R over 0 <= m <= l, where terms with m > 0
+// count twice, as those for -m are their conjugates.
 //
 //   phi = sum L_l^m conj R_l^m,   d phi/dz = sum L_(l+1)^m conj R_l^m,   d phi/dx + i d phi/dy = sum L_(l+1)^(m+1) conj R_l^m
 template <class T>
@@ -421,6 +423,7 @@ std::vector<SourceSums<T>> tree_sums(const SourceTree& targets, const std::vecto
         SourceArrays near;
         near.gather(points, ranges);
         for (Index group = box.first; group < box.last; ++group) {
+            // Points of the same group are left out; among those gathered they begin at `own` and a multiple of the group's size.
             const std::size_t skip = same ? own + (group - box.first) * group_size : 0;
             for (Index p = group * targets.group_size(); p < (group + 1) * targets.group_size(); ++p)
                 near.add_sums(at[p], 0, near.size(), skip, same ? skip + group_size : 0, sums[p]);
