@@ -20,7 +20,7 @@ namespace own_field {
 
 /// Returns 1 / sqrt(a) to an error of 1e-5.
 inline SimdFloat inverse_root(const SimdFloat& a) {
-    // One step as in the function for SimdDouble
+    // An estimate, and a step as in the function for SimdDouble.
     SimdFloat y;
 #if defined(__AVX512F__)
     y = SimdFloat(static_cast<SimdFloat::Lanes>(_mm512_rsqrt14_ps(a.lanes)));
@@ -94,16 +94,15 @@ class EdgePairMeans {
     /// Adds `sign` times the sum over the points of a rule.
     template <class Rule>
     void add(const Rule& rule, double sign) {
-        Value places[4], heights[4], weights[4];
+        Value places[4], weights[4];  // places: along the edge and through the thickness
         for (int i = 0; i < rule.count; ++i) {
             places[i] = Value(number(rule.points[i] - 0.5));
-            heights[i] = places[i];
             weights[i] = Value(number(rule.weights[i]));
         }
         for (int i = 0; i < rule.count; ++i)
             for (int iz = 0; iz < rule.count; ++iz) {
                 const Triple<Lanes> at =
-                    apart_ + scaled(places[i], lines_[0]) + scaled(heights[iz], levels_[0]);
+                    apart_ + scaled(places[i], lines_[0]) + scaled(places[iz], levels_[0]);
                 const Value weight = Value(number(sign)) * weights[i] * weights[iz];
                 Triple<Lanes> total{};
                 for (int j = 0; j < rule.count; ++j) {
@@ -112,16 +111,16 @@ class EdgePairMeans {
                     Triple<Lanes> row{};
                     for (int jz = 0; jz < rule.count; ++jz) {
                         Triple<Lanes> force;
-                        interact(from - scaled(heights[jz], levels_[1]), both * weights[jz], value_, force);
+                        interact(from - scaled(places[jz], levels_[1]), both * weights[jz], value_, force);
                         row += force;
-                        add_scaled(heights[jz], force, by_level_[1]);
+                        add_scaled(places[jz], force, by_level_[1]);
                     }
                     total += row;
                     add_scaled(places[j], row, by_line_[1]);
                 }
                 sum_ += total;
                 add_scaled(places[i], total, by_line_[0]);
-                add_scaled(heights[iz], total, by_level_[0]);
+                add_scaled(places[iz], total, by_level_[0]);
             }
     }
 
