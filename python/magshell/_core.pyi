@@ -64,6 +64,7 @@ __all__: list[str] = [
     "fine_face_points",
     "first_order_change",
     "follow_path",
+    "lane_angles",
     "lane_logarithms",
     "loaded_part",
     "lowest_modes",
@@ -1264,6 +1265,15 @@ def follow_path(
     until: typing.Any = None,
     progress: typing.Any = None,
 ) -> PathResult: ...
+def lane_angles(
+    sines: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    cosines: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    single_precision: bool = False,
+) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Angles of unit vectors as the kernels of the own field take them, to be tested.
+    """
+
 def lane_logarithms(
     numbers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> numpy.typing.NDArray[numpy.float64]:

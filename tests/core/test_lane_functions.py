@@ -44,3 +44,24 @@ def test_a_lane_does_not_depend_on_its_neighbours():
     alone = np.concatenate([_core.lane_logarithms([number]) for number in numbers])
     for shift in range(len(numbers)):
         np.testing.assert_array_equal(_core.lane_logarithms(np.roll(numbers, shift)), np.roll(alone, shift))
+
+
+@pytest.mark.parametrize(("single_precision", "rounding"), [(False, 1.2e-16), (True, 6e-8)])
+def test_angles_of_unit_vectors_are_true_to_rounding(single_precision, rounding):
+    """Check random angles, those next to multiples of pi/16, where the series begins anew, and small ones."""
+    rng = np.random.default_rng(7)
+    near = np.repeat(np.arange(-16, 17) * np.pi / 16, 50)
+    angles = np.concatenate(
+        [rng.uniform(-np.pi, np.pi, 20_000), near + rng.choice([1e-15, 1e-7, 1e-3], near.size)]
+    )
+    angles = np.concatenate([angles, rng.choice([-1.0, 1.0], 300) * 10.0 ** rng.uniform(-30, -1, 300)])
+    kind = np.float32 if single_precision else np.float64
+    sines, cosines = np.sin(angles).astype(kind).astype(float), np.cos(angles).astype(kind).astype(float)
+    true = np.arctan2(sines.astype(np.longdouble), cosines.astype(np.longdouble))
+    errors = np.abs(_core.lane_angles(sines, cosines, single_precision) - true)
+    assert (errors < 5 * rounding * np.abs(true) + 2 * rounding * (np.abs(true) > 0.1)).all()
+
+
+def test_angles_on_the_axes_are_those_of_atan2():
+    sines, cosines = np.array([0.0, -0.0, 0.0, 1.0, -1.0]), np.array([1.0, 1.0, -1.0, 0.0, 0.0])
+    np.testing.assert_array_equal(_core.lane_angles(sines, cosines), np.arctan2(sines, cosines))

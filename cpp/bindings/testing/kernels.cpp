@@ -1,10 +1,11 @@
-// Binds single functions of the core: logarithms in SIMD lanes, the loaded part of a matrix.
+// Binds single functions of the core: logarithms and angles in SIMD lanes, the loaded part of a matrix.
 #include <memory>
 #include <string>
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "magshell/core/errors.h"
+#include "magshell/core/simd_angle.h"
 #include "magshell/core/simd_functions.h"
 #include "magshell/linalg/krylov/operator_factor.h"
 #include "magshell/linalg/loaded_part.h"
@@ -13,19 +14,35 @@
 namespace magshell::bindings {
 namespace {
 
-// Returns the logarithms of numbers as the SIMD function computes them; the last SIMD vector is filled up with ones.
-py::array_t<double> lane_logarithms(const Array& numbers) {
-    py::array_t<double> out(numbers.size());
-    const double* from = numbers.data();
+// Returns a function of each pair of numbers as the lanes of SIMD vectors compute it; the last vector is filled up with ones.
+template <class Value, class Function>
+py::array_t<double> in_lanes(const Array& first, const Array& second, const Function& function) {
+    py::array_t<double> out(first.size());
     double* to = out.mutable_data();
-    for (py::ssize_t first = 0; first < numbers.size(); first += SimdDouble::width) {
-        SimdDouble group(1.0);
-        const int lanes = static_cast<int>(std::min<py::ssize_t>(SimdDouble::width, numbers.size() - first));
-        for (int lane = 0; lane < lanes; ++lane) group.set(lane, from[first + lane]);
-        group = log(group);
-        for (int lane = 0; lane < lanes; ++lane) to[first + lane] = group[lane];
+    for (py::ssize_t begin = 0; begin < first.size(); begin += Value::width) {
+        Value a(1.0f), b(1.0f);
+        const int lanes = static_cast<int>(std::min<py::ssize_t>(Value::width, first.size() - begin));
+        for (int lane = 0; lane < lanes; ++lane) {
+            a.set(lane, first.data()[begin + lane]);
+            b.set(lane, second.data()[begin + lane]);
+        }
+        a = function(a, b);
+        for (int lane = 0; lane < lanes; ++lane) to[begin + lane] = a[lane];
     }
     return out;
+}
+
+py::array_t<double> lane_logarithms(const Array& numbers) {
+    return in_lanes<SimdDouble>(numbers, numbers,
+                                [](const SimdDouble& a, const SimdDouble&) { return log(a); });
+}
+
+py::array_t<double> lane_angles(const Array& sines, const Array& cosines, bool single_precision) {
+    if (sines.size() != cosines.size())
+        throw InvalidInput("sines and cosines must have the same number of entries");
+    const auto angle = [](const auto& sine, const auto& cosine) { return angle_of(sine, cosine); };
+    return single_precision ? in_lanes<SimdFloat>(sines, cosines, angle)
+                            : in_lanes<SimdDouble>(sines, cosines, angle);
 }
 
 py::tuple loaded(Index size, const IndexArray& column_starts, const IndexArray& rows, const Array& values,
@@ -71,6 +88,9 @@ py::tuple solve_with_operator(Index size, const IndexArray& column_starts, const
 void register_kernels(py::module_& module) {
     module.def("lane_logarithms", &lane_logarithms, py::arg("numbers"),
                "ln of an array's numbers as the element kernels take it, to be tested.");
+    module.def("lane_angles", &lane_angles, py::arg("sines"), py::arg("cosines"),
+               py::arg("single_precision") = false,
+               "Angles of unit vectors as the kernels of the own field take them, to be tested.");
     module.def("solve_with_operator", &solve_with_operator, py::arg("size"), py::arg("column_starts"),
                py::arg("rows"), py::arg("values"), py::arg("added"), py::arg("rhs"), py::arg("rough"),
                py::arg("tolerance") = 0.0);

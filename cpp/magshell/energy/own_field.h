@@ -200,16 +200,11 @@ class OwnField {
         T charge{}, current{}, thickness{}, length{};
 
         ElementAdjoint& operator+=(const ElementAdjoint& other);
-        ElementAdjoint& operator-=(const ElementAdjoint& other);
-        void scale(const T& factor);
     };
     template <class T>
     struct FaceAdjoint {
         Triple<T> corners[3], normal;
         T current{}, charge{}, thickness{}, size{};
-
-        FaceAdjoint& operator+=(const FaceAdjoint& other);
-        void scale(const T& factor);
     };
     template <class T>
     struct Geometry;
@@ -257,8 +252,8 @@ class OwnField {
     template <class T>
     void add_sides(const Geometry<T>& at, const Neighbours& near, Targets targets, Evaluation<T>& out) const;
     template <class T>
-    void add_near_side(const Geometry<T>& at, Index e, Index f, ElementAdjoint<T>& of_element,
-                       FaceAdjoint<T>& of_face) const;
+    void add_near_sides(const Geometry<T>& at, const Neighbours& near, Targets targets,
+                        std::vector<T>& potentials, Evaluation<T>& out) const;
     /// Returns true if all nodes of an element belong to the rigid body of a dipole.
     bool is_part_of(Index element, Index dipole) const {
         for (int k = 0; k < elements_[element].n_nodes(); ++k)

@@ -8,6 +8,7 @@
 #include "magshell/energy/face_points.h"
 #include "magshell/energy/own_field.h"
 #include "magshell/energy/own_field_pairs.h"
+#include "magshell/energy/own_field_poses.h"
 #include "magshell/energy/source_tree.h"
 #include "magshell/energy/unstretched_vector.h"
 #include "magshell/field/dipoles.h"
@@ -48,33 +49,10 @@ struct Blend {
 };
 inline constexpr Blend of_elements{1.5, 2.0}, of_sides{2.5, 3.5};
 
-// The weight of the near value and its derivatives with respect to t: 1 up to `near`, 0 from `far` on, with continuous second
-// derivatives.
-struct BlendWeight {
-    double value, slope, curvature;
-};
-inline BlendWeight blend(const Blend& range, double t) {
-    if (t <= range.near) return {1.0, 0.0, 0.0};
-    if (t >= range.far) return {0.0, 0.0, 0.0};
-    const double width = range.far - range.near, s = (range.far - t) / width;
-    return {s * s * s * (10.0 - 15.0 * s + 6.0 * s * s), -30.0 * s * s * (1.0 - s) * (1.0 - s) / width,
-            60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (width * width)};
-}
-
 // Returns the parts of two sizes in the derivative of the larger one: halves where they are the same.
 inline std::array<double, 2> parts_of_larger(double first, double second) {
     if (std::abs(first - second) <= 1e-12 * std::max(first, second)) return {0.5, 0.5};
     return first > second ? std::array<double, 2>{1.0, 0.0} : std::array<double, 2>{0.0, 1.0};
-}
-
-// Converts the weight and its slope to the type of t: a double, or a dual number.
-inline void lift(const BlendWeight& weight, double, double& value, double& slope) {
-    value = weight.value;
-    slope = weight.slope;
-}
-inline void lift(const BlendWeight& weight, const Dual& t, Dual& value, Dual& slope) {
-    value = {weight.value, weight.slope * t.rate};
-    slope = {weight.slope, weight.curvature * t.rate};
 }
 
 // Runs body(first, last) over ranges of targets on all threads.
@@ -82,6 +60,33 @@ template <class Body>
 void in_blocks(Index count, const Body& body) {
     parallel_for((count + block - 1) / block,
                  [&](int part) { body(part * block, std::min<Index>(count, (part + 1) * block)); });
+}
+
+// Calls fill(begin, count, entries) for blocks of pairs on all threads, which sets the entries of the pairs from `begin` on, and
+// add(k, entry) for every pair in order. Keeps the entries of a chunk of pairs.
+template <class Entry, class Fill, class Add>
+void fill_in_order(Index n_pairs, const Fill& fill, const Add& add) {
+    constexpr Index chunk = 2048;
+    std::vector<Entry> entries(static_cast<std::size_t>(std::min(chunk, n_pairs)));
+    for (Index begin = 0; begin < n_pairs; begin += chunk) {
+        const Index count = std::min(chunk, n_pairs - begin);
+        in_blocks(count, [&](Index first, Index last) {
+            fill(begin + first, last - first, entries.data() + first);
+        });
+        for (Index k = 0; k < count; ++k) add(begin + k, entries[k]);
+    }
+}
+
+// Returns the points of a triangle by a rule. The fine ones of energy/face_points.h are listed twice, on two levels through a thickness,
+// which a triangle does not have.
+inline std::vector<FacePoint> points_of_triangle(const GaussRule& rule) {
+    if (&rule == &coarse) return {std::begin(triangle_points), std::end(triangle_points)};
+    std::vector<FacePoint> points;
+    for (std::size_t k = 0; k < face_points::fine.size(); k += 2) {
+        points.push_back(face_points::fine[k]);
+        points.back().weight *= 2.0;
+    }
+    return points;
 }
 
 }  // namespace own_field
@@ -215,11 +220,9 @@ struct OwnField::Geometry {
             point.charge = T(weight) * charges[e];
             body(point, sample);
         };
-        if (&rule == &own_field::coarse)
-            for (const FacePoint& point : own_field::triangle_points) add(point, point.weight);
-        else  // `fine` lists each point twice, on two levels through a thickness, which a triangle does not have
-            for (std::size_t k = 0; k < face_points::fine.size(); k += 2)
-                add(face_points::fine[k], 2.0 * face_points::fine[k].weight);
+        static const std::vector<FacePoint> few = own_field::points_of_triangle(own_field::coarse),
+                                            many = own_field::points_of_triangle(own_field::fine);
+        for (const FacePoint& point : &rule == &own_field::coarse ? few : many) add(point, point.weight);
     }
 
     // Calls body(point, barycentric, zeta, weight) for the three points of each charged side of a face: zeta = 1/2 and
@@ -253,6 +256,51 @@ struct OwnField::Geometry {
         out.current += dot(by_element, along(element));
     }
 
+    own_field::ElementPose<T> pose(Index e) const {
+        const Element& element = field.elements_[e];
+        own_field::ElementPose<T> pose{middle(element), {along(element), {}}, charges[e], {}, element.length};
+        if (element.is_edge()) {
+            pose.axes[1] = T(field.element_thickness_[e]) * element_normals[e];
+            pose.current = element_currents[e];
+        } else {
+            pose.axes[1] = x[element.nodes[2]] - x[element.nodes[0]];
+        }
+        return pose;
+    }
+    void add(Index e, const own_field::PoseAdjoint<T>& by, ElementAdjoint<T>& out) const {
+        const Element& element = field.elements_[e];
+        add_by_middle(element, by.middle, out);
+        out.nodes[0] -= by.axes[0];
+        out.nodes[1] += by.axes[0];
+        out.charge += by.charge;
+        out.length += by.size;
+        if (element.is_edge()) {
+            out.current += by.current;
+            out.normal += T(field.element_thickness_[e]) * by.axes[1];
+            out.thickness += dot(element_normals[e], by.axes[1]);
+        } else {
+            out.nodes[0] -= by.axes[1];
+            out.nodes[2] += by.axes[1];
+        }
+    }
+
+    own_field::FacePose<T> face_pose(Index f) const {
+        const Face& face = field.faces_[f];
+        return {{x[face.nodes[0]], x[face.nodes[1]], x[face.nodes[2]]},
+                T(field.thickness_[f]) * normals[f],
+                currents[f],
+                field.side_charges_[f],
+                face.size};
+    }
+    void add(Index f, const own_field::FacePoseAdjoint<T>& by, FaceAdjoint<T>& out) const {
+        for (int k = 0; k < 3; ++k) out.corners[k] += by.corners[k];
+        out.normal += T(field.thickness_[f]) * by.level;
+        out.thickness += dot(normals[f], by.level);
+        out.current += by.current;
+        out.charge += by.charge;
+        out.size += by.size;
+    }
+
     // Adds the derivatives with respect to the values of a face, given the sums at a point of one of its charged sides.
     void add(Index f, const SourceSums<T>& sums, const double* weights, double zeta, double weight,
              FaceAdjoint<T>& out) const {
@@ -270,38 +318,6 @@ OwnField::ElementAdjoint<T>& OwnField::ElementAdjoint<T>::operator+=(const Eleme
     normal += other.normal;
     charge += other.charge, current += other.current, thickness += other.thickness, length += other.length;
     return *this;
-}
-
-template <class T>
-OwnField::ElementAdjoint<T>& OwnField::ElementAdjoint<T>::operator-=(const ElementAdjoint& other) {
-    for (int k = 0; k < 3; ++k) nodes[k] -= other.nodes[k];
-    normal -= other.normal;
-    charge -= other.charge, current -= other.current, thickness -= other.thickness, length -= other.length;
-    return *this;
-}
-
-template <class T>
-void OwnField::ElementAdjoint<T>::scale(const T& factor) {
-    for (Triple<T>& node : nodes) node = factor * node;
-    normal = factor * normal;
-    charge = factor * charge, current = factor * current, thickness = factor * thickness,
-    length = factor * length;
-}
-
-template <class T>
-OwnField::FaceAdjoint<T>& OwnField::FaceAdjoint<T>::operator+=(const FaceAdjoint& other) {
-    for (int k = 0; k < 3; ++k) corners[k] += other.corners[k];
-    normal += other.normal;
-    current += other.current, charge += other.charge, thickness += other.thickness, size += other.size;
-    return *this;
-}
-
-template <class T>
-void OwnField::FaceAdjoint<T>::scale(const T& factor) {
-    for (Triple<T>& corner : corners) corner = factor * corner;
-    normal = factor * normal;
-    current = factor * current, charge = factor * charge, thickness = factor * thickness,
-    size = factor * size;
 }
 
 /// Trees over the coarse points of the target elements and over the charged sides of the target faces, in the order of `element_order_` and

@@ -1,6 +1,7 @@
-#include <cmath>
+#include <algorithm>
 
 #include "magshell/energy/own_field_geometry.h"
+#include "magshell/energy/own_field_side_pairs.h"
 
 namespace magshell {
 
@@ -8,26 +9,71 @@ using namespace own_field;
 
 namespace {
 
-// The solid angle of the triangle with corners r, seen from the origin, positive on the side of its normal [Van Oosterom, Strackee 1983],
-// and its derivatives with respect to the corners.
-template <class T>
-T solid_angle(const Triple<T> r[3], Triple<T> by_corner[3]) {
-    using std::atan2;
-    const T l[3] = {norm(r[0]), norm(r[1]), norm(r[2])};
-    const Triple<T> across[3] = {cross(r[1], r[2]), cross(r[2], r[0]), cross(r[0], r[1])};
-    const T d[3] = {dot(r[1], r[2]), dot(r[2], r[0]), dot(r[0], r[1])};
-    const T volume = dot(r[0], across[0]);
-    const T other = l[0] * l[1] * l[2] + d[0] * l[0] + d[1] * l[1] + d[2] * l[2];
-    const T scale = T(2.0) / (volume * volume + other * other);
-    for (int k = 0; k < 3; ++k) {
-        const int i = (k + 1) % 3, j = (k + 2) % 3;
-        const Triple<T> by_other = ((l[i] * l[j] + d[k]) / l[k]) * r[k] + l[j] * r[i] + l[i] * r[j];
-        by_corner[k] = scale * (volume * by_other - other * across[k]);
+// Sets the derivatives for the pairs with these numbers in a block. meets: the elements are edges of the faces.
+template <class Value, class T>
+void set_sides(const std::vector<ElementPose<T>>& elements, const std::vector<FacePose<T>>& faces,
+               const Units& units, const std::array<Index, 2>* pairs, const std::vector<Index>& numbers,
+               bool edges, bool meets, SideAdjoint<T>* out) {
+    using Pairs = SidePairs<T, Value>;
+    using Rows = ElementRows<typename Pairs::Pair::Number>;
+    static const Rows few(coarse), many(fine);
+    const Index count = static_cast<Index>(numbers.size());
+    for (Index begin = 0; begin < count; begin += Pairs::width) {
+        Pairs sums(units);
+        for (int lane = 0; lane < Pairs::width; ++lane) {  // the last pair again in lanes that are left
+            const auto& [element, face] = pairs[numbers[std::min(begin + lane, count - 1)]];
+            sums.set(lane, elements[element], faces[face]);
+        }
+        sums.add_points(few(edges));
+        if (!meets) sums.add_angles(many(edges));
+        sums.finish(meets);
+        for (Index k = begin; k < std::min(begin + Pairs::width, count); ++k)
+            out[numbers[k]] = sums(static_cast<int>(k - begin));
     }
-    return T(-2.0) * atan2(volume, other);
 }
 
 }  // namespace
+
+template <class T>
+void OwnField::add_near_sides(const Geometry<T>& at, const Neighbours& near, Targets targets,
+                              std::vector<T>& potentials, Evaluation<T>& out) const {
+    constexpr bool has_rates = std::is_same_v<T, Dual>;
+    std::vector<ElementPose<T>> elements;
+    std::vector<FacePose<T>> faces;
+    for (Index k = 0; k < target_elements(targets); ++k) elements.push_back(at.pose(element_order_[k]));
+    for (Index k = 0; k < target_faces(targets); ++k) faces.push_back(at.face_pose(face_order_[k]));
+    const Units units = has_rates && near.is_rough ? units_of(at.x, elements, faces) : Units();
+    std::vector<PoseAdjoint<T>> of_elements(elements.size());
+    std::vector<FacePoseAdjoint<T>> of_faces(faces.size());
+    const auto kind_of = [&](const std::array<Index, 2>& pair) {  // 0: triangle, 1: edge, 2: edge of the face
+        const Element& element = elements_[element_order_[pair[0]]];
+        const Index f = face_order_[pair[1]];
+        return !element.is_edge() ? 0 : element.bodies[0] == f || element.bodies[1] == f ? 2 : 1;
+    };
+    const auto fill = [&](Index begin, Index count, SideAdjoint<T>* adjoints) {
+        const std::array<Index, 2>* const pairs = near.sides.data() + begin;
+        std::vector<Index> numbers[3];
+        for (Index k = 0; k < count; ++k) numbers[kind_of(pairs[k])].push_back(k);
+        for (int kind = 0; kind < 3; ++kind)
+            if (has_rates && near.is_rough)
+                set_sides<SimdFloat>(elements, faces, units, pairs, numbers[kind], kind > 0, kind == 2,
+                                     adjoints);
+            else
+                set_sides<SimdDouble>(elements, faces, units, pairs, numbers[kind], kind > 0, kind == 2,
+                                      adjoints);
+    };
+    fill_in_order<SideAdjoint<T>>(static_cast<Index>(near.sides.size()), fill,
+                                  [&](Index k, const SideAdjoint<T>& adjoint) {
+                                      of_elements[near.sides[k][0]] += adjoint.element;
+                                      of_faces[near.sides[k][1]] += adjoint.face;
+                                  });
+    for (std::size_t k = 0; k < elements.size(); ++k) {
+        potentials[k] += of_elements[k].charge;
+        at.add(element_order_[k], of_elements[k], out.elements[element_order_[k]]);
+    }
+    for (std::size_t k = 0; k < faces.size(); ++k)
+        at.add(face_order_[k], of_faces[k], out.faces[face_order_[k]]);
+}
 
 template <class T>
 void OwnField::add_sides(const Geometry<T>& at, const Neighbours& near, Targets targets,
@@ -86,93 +132,8 @@ void OwnField::add_sides(const Geometry<T>& at, const Neighbours& near, Targets 
                 });
         }
     });
-    std::vector<ElementAdjoint<T>> of_elements_near(near.sides.size());
-    std::vector<FaceAdjoint<T>> of_faces_near(near.sides.size());
-    in_blocks(static_cast<Index>(near.sides.size()), [&](Index first, Index last) {
-        for (Index k = first; k < last; ++k)
-            add_near_side(at, element_order_[near.sides[k][0]], face_order_[near.sides[k][1]],
-                          of_elements_near[k], of_faces_near[k]);
-    });
-    for (std::size_t k = 0; k < near.sides.size(); ++k) {
-        const Index e = element_order_[near.sides[k][0]], f = face_order_[near.sides[k][1]];
-        potentials[near.sides[k][0]] += of_elements_near[k].charge;
-        out.elements[e] += of_elements_near[k];
-        out.faces[f] += of_faces_near[k];
-    }
+    add_near_sides(at, near, targets, potentials, out);
     for (Index k = 0; k < active_elements_; ++k) out.energy += at.charges[element_order_[k]] * potentials[k];
-}
-
-// Replaces the points of a charged side by two layers of dipoles, with the weight of the near value; takes the pair away if the element
-// is an edge of the face.
-template <class T>
-void OwnField::add_near_side(const Geometry<T>& at, Index e, Index f, ElementAdjoint<T>& of_element,
-                             FaceAdjoint<T>& of_face) const {
-    const Element& element = elements_[e];
-    const Face& face = faces_[f];
-    const T charge = at.charges[e];
-    ElementAdjoint<T> element_change;
-    FaceAdjoint<T> face_change;
-    // Their energy with the points is subtracted.
-    at.each_side_point(
-        f, [&](const SourcePoint<T>& side, const double* weights, double side_zeta, double side_weight) {
-            SourceSums<T> at_side;
-            at.each_point(e, coarse, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
-                const Triple<T> d = point.at - side.at;
-                const T inverse = T(1.0) / norm(d);
-                const T cubed = inverse * inverse * inverse;
-                SourceSums<T> at_element;
-                at_element.charges = -side.charge * inverse;
-                at_element.pull = (-point.charge * side.charge) * cubed * d;
-                at.add(e, at_element, sample, element_change);
-                at_side.charges -= point.charge * inverse;
-                at_side.pull -= at_element.pull;
-            });
-            at.add(f, at_side, weights, side_zeta, side_weight, face_change);
-        });
-    const bool meet = element.is_edge() && (element.bodies[0] == f || element.bodies[1] == f);
-    if (!meet)
-        for (int level = 0; level < coarse.count; ++level) {
-            const double side_zeta = coarse.points[level] - 0.5;
-            const Triple<T> shift = T(side_zeta * thickness_[f]) * at.normals[f];
-            at.each_point(e, fine, [&](const SourcePoint<T>& point, const SamplePoint& sample) {
-                Triple<T> r[3], by_corner[3];
-                for (int k = 0; k < 3; ++k) r[k] = at.x[face.nodes[k]] + shift - point.at;
-                const T angle = solid_angle(r, by_corner);
-                const double share = strength * sample.weight * coarse.weights[level];
-                const T potential = T(share) * at.currents[f] * angle;
-                element_change.charge += potential;
-                face_change.current += T(share) * charge * angle;
-                const T force = T(share) * charge * at.currents[f];
-                Triple<T> sum;
-                for (int k = 0; k < 3; ++k) {
-                    const Triple<T> pull = force * by_corner[k];
-                    face_change.corners[k] += pull;
-                    sum += pull;
-                }
-                face_change.normal += T(side_zeta * thickness_[f]) * sum;
-                face_change.thickness += T(side_zeta) * dot(at.normals[f], sum);
-                for (int k = 0; k < element.n_nodes(); ++k)
-                    element_change.nodes[k] -= T(sample.weights[k]) * sum;
-                element_change.normal -= T(sample.zeta * element_thickness_[e]) * sum;
-                element_change.thickness -= T(sample.zeta) * dot(at.element_normals[e], sum);
-            });
-        }
-    const Triple<T> apart = at.middle(element) - at.center(face);
-    const T distance = norm(apart), longer = std::max(element.length, face.size);
-    T weight, slope;
-    lift(meet ? BlendWeight{1.0, 0.0, 0.0} : blend(of_sides, value_of(distance) / value_of(longer)),
-         distance / longer, weight, slope);
-    const Triple<T> by_middle = (charge * element_change.charge * slope / (distance * longer)) * apart;
-    const T by_longer = -charge * element_change.charge * slope * distance / (longer * longer);
-    const std::array<double, 2> parts = parts_of_larger(element.length, face.size);
-    element_change.scale(weight);
-    face_change.scale(weight);
-    element_change.length += T(parts[0]) * by_longer;
-    face_change.size += T(parts[1]) * by_longer;
-    at.add_by_middle(element, by_middle, element_change);
-    for (Triple<T>& corner : face_change.corners) corner -= T(1.0 / 3.0) * by_middle;
-    of_element += element_change;
-    of_face += face_change;
 }
 
 template void OwnField::add_sides(const Geometry<double>&, const Neighbours&, Targets,
