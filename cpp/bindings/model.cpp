@@ -437,6 +437,25 @@ void register_model(py::module_& module) {
             py::arg("q"), py::call_guard<py::gil_scoped_release>(),
             "The energy of each shell of the own field in its own field alone, (n,) [J].")
         .def(
+            "own_field_gap_forces",
+            [](const Model& model, const VectorXd& q) {
+                OwnField::GapForces found;
+                std::vector<std::string> owners;
+                if (const OwnFieldTerm* own_field = model.terms().own_field) {
+                    const py::gil_scoped_release unlocked;
+                    owners = own_field->owners();
+                    found = own_field->gap_forces(q.data());
+                }
+                return std::tuple(owners, rows_from(found.taken), rows_from(found.finer), found.sizes,
+                                  found.nearest);
+            },
+            py::arg("q"),
+            "Of each body of the own field: its owner, the force [N] of others on it between near elements, "
+            "as the "
+            "energy has it and at more points, (n, 3) each, the sum of the sizes of the latter on its "
+            "elements [N], and "
+            "the distance of the nearest points [m].")
+        .def(
             "low_rank",
             [](Model& model, bool reduced) {
                 const std::lock_guard lock(model.in_use());

@@ -564,6 +564,18 @@ class Model:
         """
         The energy of each shell of the own field in its own field alone, (n,) [J].
         """
+    def own_field_gap_forces(
+        self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
+    ) -> tuple[
+        list[str],
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+        list[float],
+        list[float],
+    ]:
+        """
+        Of each body of the own field: its owner, the force [N] of others on it between near elements, as the energy has it and at more points, (n, 3) each, the sum of the sizes of the latter on its elements [N], and the distance of the nearest points [m].
+        """
     def own_field_on_moments(
         self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> tuple[

@@ -121,10 +121,11 @@ class StepErrorWarning(UserWarning):
 
 
 class FieldSamplingWarning(UserWarning):
-    """A warning about a magnetic force on a shell or skin that is wrong by more than 1 %, or by an unknown amount.
+    """A warning about a magnetic force on a body that is wrong by more than 1 %, or by an unknown amount.
 
     Faces that are near a source when a solve begins sample its field at many points (docs/theory.md). The warning comes
-    where that is not enough, and where bodies come near a source in a motion or on a path.
+    where that is not enough, and where bodies come near a source in a motion or on a path. It comes also where a body has
+    vertices inside of a magnet, and where bodies of an OwnField are too near each other for their meshes.
     """
 
 

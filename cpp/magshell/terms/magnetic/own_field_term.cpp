@@ -179,6 +179,22 @@ std::vector<double> OwnFieldTerm::own_energies(const double* q) const {
     return energies;
 }
 
+OwnField::GapForces OwnFieldTerm::gap_forces(const double* q) const {
+    std::vector<Index> of_faces, of_tetrahedra;
+    Index body = 0;
+    for (const SheetTriangles& sheet : sheets_) of_faces.insert(of_faces.end(), sheet.n_triangles(), body++);
+    for (const MagnetizedSolid& each : solids_)
+        of_tetrahedra.insert(of_tetrahedra.end(), each.solid->n_elements(), body++);
+    return field_.gap_forces(q, state_at(q)->near, of_faces, of_tetrahedra, body);
+}
+
+std::vector<std::string> OwnFieldTerm::owners() const {
+    std::vector<std::string> owners;
+    for (const SheetTriangles& sheet : sheets_) owners.push_back(sheet.owner());
+    for (const MagnetizedSolid& each : solids_) owners.push_back(each.solid->owner);
+    return owners;
+}
+
 void OwnFieldTerm::vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                        Gradient& out) {
     const double factor = load_parameters[factor_.first];

@@ -46,6 +46,10 @@ class OwnFieldTerm final : public OperatorTerm, public RestShapeTerm {
     const OwnField& field() const { return *sources_; }
     /// Returns the energy of each surface and of each solid in its own field alone [J].
     std::vector<double> own_energies(const double* q) const;
+    /// Returns the forces between near elements of the surfaces and solids, first of the surfaces.
+    OwnField::GapForces gap_forces(const double* q) const;
+    /// Returns the owners of the surfaces and solids.
+    std::vector<std::string> owners() const;
 
   private:
     /// The own field at one state, which energy, forces and Hessian share.

@@ -41,10 +41,11 @@ TRUSTED = 0.01
 TRUSTED_OF_ELEMENTS = 0.001
 # [-] Smallest reference for the error, as a fraction of the sum of the forces' magnitudes: where forces cancel, the
 # resultant is too small to refer to.
-_CANCELLING = 0.1
+CANCELLING = 0.1
 # [-] Estimate of the core above which the error is computed. It is 0.6 to 1.2 times the error where that is about 1 %, and
 # a quarter of it or more on meshes far too coarse; see test_the_estimate_of_the_core_is_0_6_to_1_2_times_the_error.
 _SUSPECT = 0.35 * TRUSTED
+_ON_SURFACE = 1e-9  # [-] distance from a magnet's surface, over the extent, within which a vertex is on it
 _MOST_NAMED = 4  # faces in a warning
 _TOGETHER = 2048  # faces whose samples are in memory at the same time
 
@@ -115,12 +116,12 @@ def warn_of_sampling(found: Iterable[SamplingError], where: str) -> None:
     found = list(found)
     worst = max(found, key=lambda each: each.error, default=None)
     if worst is not None and worst.error > TRUSTED:
-        _warn(
+        warn_of_forces(
             f"{where}: the magnetic force on {worst.body!r} is off by about {worst.error:.2%}, {_advice(worst)}"
         )
     for each in found:
         if len(unknown := np.flatnonzero(np.isnan(each.off))):
-            _warn(
+            warn_of_forces(
                 f"{where}: {_named(unknown)} of {each.body!r}, with their thickness, reach to where a field has no value, "
                 "into a magnet or out of a grid, so that the error of the magnetic force on them cannot be told. Keep the "
                 "body farther away, or take a larger grid"
@@ -141,13 +142,13 @@ def warn_of_elements(found: Iterable[SamplingError], where: str) -> None:
             )
             if each.fine[order[0]]:
                 why, what_to_do = "although elements near the sources sample the field at many points", "take"
-            _warn(
+            warn_of_forces(
                 f"{where}: the magnetic force on {each.body!r} is off by about {each.error:.2%}, {why}, and it changes "
                 f"over them; most of that is of {_named(order, 'elements')}. To mend it, {what_to_do} smaller elements "
                 "there, or keep the body farther away"
             )
         if len(unknown := np.flatnonzero(np.isnan(each.off))):
-            _warn(
+            warn_of_forces(
                 f"{where}: {_named(unknown, 'elements')} of {each.body!r} reach to where a field has no value, into a "
                 "magnet or out of a grid, so that the error of the magnetic force on them cannot be told. Keep the body "
                 "farther away, or take a larger grid"
@@ -195,8 +196,33 @@ def _named(faces: np.ndarray, what: str = "faces") -> str:
     return f"{what} {', '.join(map(str, faces[:_MOST_NAMED].tolist()))}{more}"
 
 
-def _warn(text: str) -> None:
+def warn_of_forces(text: str) -> None:
     warnings.warn(FieldSamplingWarning(text), stacklevel=callers_level())
+
+
+def warn_of_entry(values: Values, positions: np.ndarray, where: str) -> None:
+    """Warn if vertices of magnetized bodies are inside of a magnet, where its field has another formula.
+
+    positions: (n_v, 3) m.
+    """
+    scene = values.scene
+    magnetized = [
+        span.vertices
+        for body, span in zip(scene.bodies, scene._bodies.spans, strict=True)
+        if not isinstance(body, Solid) or body.skin is not None or body.remanent_magnetization is not None
+    ]
+    if not magnetized or not np.isfinite(positions).all():
+        return
+    rows = np.concatenate([np.arange(each.start, each.stop) for each in magnetized])
+    # Vertices that are on the surface of a magnet, to round-off, are not inside.
+    around = _ON_SURFACE * scene._bodies.extent * np.concatenate([np.eye(3), -np.eye(3)])
+    for field in map(values.current, scene.fields):
+        inside = rows[np.all([field._in_magnets(positions[rows] + each) for each in around], axis=0)]
+        if len(inside):
+            warn_of_forces(
+                f"{where}: {_named(inside, 'vertices')} are inside of {field!r:.80}. Its field has another formula there, "
+                "and it does not stop a body: add a Contact with an obstacle of its shape, or keep it farther away"
+            )
 
 
 def sampling_errors(
@@ -239,7 +265,7 @@ def _size_of_forces(forces: np.ndarray, couples: np.ndarray, extent: float) -> f
     """Return the force [N] to which an error refers, from forces (n, 3) N and couples (n, 3) N m on the parts of a body."""
     return max(
         float(np.linalg.norm(forces.sum(axis=0))),
-        _CANCELLING * float(np.linalg.norm(forces, axis=1).sum()),
+        CANCELLING * float(np.linalg.norm(forces, axis=1).sum()),
         float(np.linalg.norm(couples, axis=1).sum()) / extent,
     )
 

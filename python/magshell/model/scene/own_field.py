@@ -91,7 +91,7 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
             "own_field_max_points": 0,
             "own_field_accuracy": 0.0,
         }
-    chosen = _all_magnetized(scene) if given.bodies is None else given.bodies
+    chosen = bodies_with_own_field(scene)
     if not chosen:
         raise ValueError("own_field: no body of the scene has a magnetization")
     for body in chosen:
@@ -119,8 +119,10 @@ def own_field_inputs(scene: Scene) -> dict[str, object]:
     }
 
 
-def _all_magnetized(scene: Scene) -> list[Shell | Solid | RigidBody]:
-    """Return the bodies of a scene that have a magnetization or a moment: those that OwnField() includes."""
+def bodies_with_own_field(scene: Scene) -> Sequence[Shell | Solid | RigidBody]:
+    """Return the bodies whose field acts: those that the OwnField of a scene names, or all that are magnetized."""
+    if scene.own_field is None or scene.own_field.bodies is not None:
+        return () if scene.own_field is None else scene.own_field.bodies
     bodies = [
         body
         for body in scene.bodies

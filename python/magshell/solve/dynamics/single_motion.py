@@ -17,8 +17,16 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.fields.magnets import describe_magnet_overlap
-from ...model.scene.field_sampling import element_errors, sampling_errors, warn_of_elements, warn_of_sampling
+from ...model.scene.field_sampling import (
+    element_errors,
+    sampling_errors,
+    warn_of_elements,
+    warn_of_entry,
+    warn_of_sampling,
+)
 from ...model.scene.fine_faces import fine_faces
+from ...model.scene.own_field_errors import gap_errors, warn_of_gaps
+from ...model.scene.own_field_overlap import check_magnets_apart
 from ...model.scene.replacements import requested
 from ...model.scene.reshaped import reshaped, turning_supports
 from ...model.scene.scene import Scene
@@ -153,6 +161,7 @@ def run(
     watch = stop_at_once if motion_inputs.interrupted else lambda fraction, residual: progress(fraction)
     along = None if isinstance(time_step, Adaptive) else _requested_tangents(motion_inputs)
     known = None
+    check_magnets_apart(scene, scene._model.positions(motion_inputs.start.state))
     with motion_inputs.inputs.in_core():
         check_apart(scene, motion_inputs.start.state)
         if along is None:
@@ -255,6 +264,11 @@ def _warn(result: Trajectory) -> None:
 
 def _warn_of_fields(result: Trajectory) -> None:
     """Warn of coarsely sampled fields in the state of largest magnetic energy, where magnets are nearest."""
+    if result.scene.own_field is not None:
+        energies = result.energies["own field"]
+        for k in sorted({int(np.argmin(energies)), int(np.argmax(energies))}):  # bodies are nearest at one
+            where = f"the motion, in recorded state {k}, at {result.times[k]:.6g} s"
+            warn_of_gaps(gap_errors(result._values_at(k), result._state_at(k)), where)
     if not result.scene.fields:
         return
     k = int(np.argmax(np.abs(result.energies.get("magnetic", np.zeros(len(result))))))
@@ -268,6 +282,7 @@ def _warn_of_fields(result: Trajectory) -> None:
     )
     warn_of_sampling(sampling_errors(*state), where)
     warn_of_elements(element_errors(*state), where)
+    warn_of_entry(*state[:2], where)
 
 
 def _requested_tangents(motion_inputs: MotionInputs) -> Sequence[np.ndarray] | None:

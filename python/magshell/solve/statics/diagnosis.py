@@ -8,6 +8,7 @@ import numpy as np
 
 from ...model.bodies.bodies import called
 from ...model.fields.magnets import describe_magnet_overlap
+from ...model.scene.own_field_errors import describe_coincident_points
 from ...model.shells.obtuse_faces import describe_faces
 from ...model.supports.constraints import free_rigid_motions
 from .solve_log import SolveLog, SolveStep, steps_of
@@ -74,6 +75,8 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
         fields = map(inputs.values.current, scene.fields)
         if inside := describe_magnet_overlap(fields, positions, scene.mesh.edge_lengths):
             return " ".join([*sentences, inside, kept])
+        if touching := describe_coincident_points(inputs.values, failed.state):
+            return " ".join([*sentences, touching, kept])
     return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
 
 

@@ -31,9 +31,11 @@ from ...model.scene.field_sampling import (
     is_suspect,
     sampling_errors,
     warn_of_elements,
+    warn_of_entry,
     warn_of_sampling,
 )
 from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
+from ...model.scene.own_field_errors import gap_errors, warn_of_gaps
 from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs, plain_inputs
@@ -441,9 +443,16 @@ def _warn_of_fields(path: EquilibriumPath) -> None:
         found = sampling_errors(*_fields_at(path, k))
         warn_of_sampling(found, f"the path, at point {k}, parameter {path.parameters[k]:.4g}")
     if has_elements(path._values_at(0)):
-        k = int(np.argmax(_magnetic_energies(path)))  # magnets are nearest there
+        k = int(np.argmax(np.abs(_energies_of(path, "magnetic"))))  # magnets are nearest there
         found = element_errors(*_fields_at(path, k))
         warn_of_elements(found, f"the path, at point {k}, parameter {path.parameters[k]:.4g}")
+    k = len(path) - 1
+    warn_of_entry(path._values_at(k), path.positions[k], f"the path, at its end, point {k}")
+    if path.scene.own_field is not None:
+        energies = _energies_of(path, "own field")
+        for k in sorted({int(np.argmin(energies)), int(np.argmax(energies))}):  # bodies are nearest at one
+            found = gap_errors(path._values_at(k), path._points[k].state)
+            warn_of_gaps(found, f"the path, at point {k}, parameter {path.parameters[k]:.4g}")
 
 
 def _fields_at(path: EquilibriumPath, k: int) -> tuple[Values, np.ndarray, float, np.ndarray]:
@@ -456,13 +465,13 @@ def _fields_at(path: EquilibriumPath, k: int) -> tuple[Values, np.ndarray, float
     )
 
 
-def _magnetic_energies(path: EquilibriumPath) -> np.ndarray:
-    """Return the magnitude of the energy in the applied field at each point [J]."""
+def _energies_of(path: EquilibriumPath, term: str) -> np.ndarray:
+    """Return the energy of a term at each point [J]."""
     energies = []
     for k, (point, load_parameters) in enumerate(zip(path._points, path._load_parameters, strict=True)):
         with path._values_at(k).in_core():
             terms = path.scene._model.energies(point.state, load_parameters)
-        energies.append(abs(terms.get("magnetic", 0.0)))
+        energies.append(terms.get(term, 0.0))
     return np.array(energies)
 
 

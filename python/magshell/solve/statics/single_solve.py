@@ -24,9 +24,12 @@ from ...model.scene.field_sampling import (
     is_suspect,
     sampling_errors,
     warn_of_elements,
+    warn_of_entry,
     warn_of_sampling,
 )
 from ...model.scene.fine_faces import Errors, keeping_fine_faces, with_fine_faces, with_fine_faces_and_errors
+from ...model.scene.own_field_errors import gap_errors, warn_of_gaps
+from ...model.scene.own_field_overlap import check_magnets_apart
 from ...model.scene.replacements import requested
 from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
@@ -122,6 +125,7 @@ def find(
     options.smallest_step /= max(filling, 1.0)
     with inputs.in_core():
         check_apart(scene, state)
+    check_magnets_apart(scene, scene._model.positions(state))
     return solve(
         inputs, state, angle_branches, from_, inputs.load_parameters, options, search.progress, moving
     )
@@ -219,6 +223,8 @@ def solve(
             warn_of_sampling(of_faces, "this equilibrium")
         of_elements = element_errors(*at) if errors.elements is None else errors.elements
         warn_of_elements(of_elements, "this equilibrium")
+        warn_of_entry(inputs.values, positions, "this equilibrium")
+        warn_of_gaps(gap_errors(inputs.values, found.state), "this equilibrium")
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Solution(result, found, inputs)

@@ -13,6 +13,7 @@ import scipy
 from .... import _core as core
 from ....mesh.io.read_write import read_mesh
 from ....mesh.triangles.triangle_mesh import TriangleMesh
+from ....mesh.triangles.winding_numbers import winding_numbers
 from .obstacle import NO_MIDDLE, Obstacle, Surface
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ def _check_orientation(mesh: TriangleMesh) -> None:
         which = "the obstacle's mesh" if mesh.n_components == 1 else f"part {k} of the obstacle's mesh"
         if abs(volume) <= 1e-9 * np.linalg.norm(np.ptp(x[faces.ravel()], axis=0)) ** 3:
             raise ValueError(f"{which} encloses no volume: {volume:.3g} m3, near {_at(x[faces[0, 0]])}")
-        around = _winding_number(x[mesh.faces[part != k]] - x[faces[0, 0]])
+        around = winding_numbers(x[faces[0, :1]], x[mesh.faces[part != k]])[0]
         where = f"near vertex {faces[0, 0]} at {_at(x[faces[0, 0]])}"
         if volume < 0 and around < 0.5:
             raise ValueError(
@@ -157,20 +158,6 @@ def _volume(corners: np.ndarray) -> float:
     """Return the volume enclosed by triangles (m, 3, 3) m, m3."""
     relative = corners - corners.mean(axis=(0, 1))
     return float(np.linalg.det(relative).sum() / 6)
-
-
-def _winding_number(corners: np.ndarray) -> float:
-    """Return the winding number of closed triangles (m, 3, 3) m about the origin.
-
-    It is the sum of solid angles (van Oosterom and Strackee 1983).
-    """
-    if not len(corners):
-        return 0.0
-    a, b, c = np.moveaxis(corners, 1, 0)
-    la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
-    ab, bc, ca = (np.einsum("fi,fi->f", p, q) for p, q in ((a, b), (b, c), (c, a)))
-    solid = 2 * np.arctan2(np.linalg.det(corners), la * lb * lc + ab * lc + bc * la + ca * lb)
-    return float(solid.sum() / (4 * np.pi))
 
 
 def _at(point: np.ndarray) -> str:

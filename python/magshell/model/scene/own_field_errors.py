@@ -1,0 +1,90 @@
+"""Estimates the error of the own field's forces between bodies that are near each other, and warns where it is large.
+
+Near edges and triangles are sampled at 4 x 4 and 16 points. Where the gap between two bodies is much less than the spacing
+of these points, the forces are wrong. The core compares them with the closed form of one element at finer points of the
+other,
+
+    error = |sum F - sum F_finer| / max(|force of the own field on the body|, sum |F_finer| / 10),
+
+for each body, by all near elements of the others. Elements of one body are not compared, nor are moments of rigid bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .field_sampling import CANCELLING, TRUSTED, warn_of_forces
+
+if TYPE_CHECKING:
+    from .values import Values
+
+
+_COINCIDE = 1e-9  # [-] distance of two points, over the extent, below which they coincide
+
+
+class GapError(NamedTuple):
+    """The relative error of the force on a body by others in its own field, and its distance from them [m].
+
+    error: infinite where points of two bodies coincide.
+    """
+
+    body: Any
+    error: float
+    gap: float
+
+
+def gap_errors(values: Values, state: np.ndarray) -> Iterator[GapError]:
+    """Yield the error of each body that is near others in the own field of a scene."""
+    scene = values.scene
+    if scene.own_field is None or not np.isfinite(state).all():
+        return
+    with values.in_core():
+        owners, taken, finer, sizes, gaps = scene._model.own_field_gap_forces(state)
+        if not np.isfinite(gaps).any():
+            return
+        layout = scene._load_parameter_layout
+        factor = layout.packed({("scene", "own_field_factor"): np.ones(1)}, layout.zeros())
+        forces = -scene._model.positions(scene._model.term_gradient("own field", state, factor))
+    objects = {label: each for each, label in scene._labels}
+    for owner, force, better, size, gap in zip(owners, taken, finer, sizes, gaps, strict=True):
+        if not np.isfinite(gap):
+            continue
+        body = objects[owner]
+        number = next(
+            k for k, each in enumerate(scene.bodies) if each is body or getattr(each, "skin", None) is body
+        )
+        total = np.linalg.norm(forces[scene._bodies.spans[number].vertices].sum(axis=0))
+        reference = max(float(total), CANCELLING * size)
+        error = float(np.linalg.norm(force - better)) / reference if reference > 0.0 else 0.0
+        yield GapError(body, error if np.isfinite(error) else np.inf, float(gap))
+
+
+def describe_coincident_points(values: Values, state: np.ndarray) -> str:
+    """Return a sentence for an error message if points of two bodies with an own field coincide, else ""."""
+    scene = values.scene
+    if scene.own_field is None or not np.isfinite(state).all():
+        return ""
+    with values.in_core():
+        gaps = scene._model.own_field_gap_forces(state)[-1]
+    if not min(gaps, default=np.inf) < _COINCIDE * scene._bodies.extent:
+        return ""
+    return (
+        "Bodies with an own field touch: points of their sources coincide, where forces are infinite. Leave a gap of a part "
+        "of the edges' length between them."
+    )
+
+
+def warn_of_gaps(found: Iterable[GapError], where: str) -> None:
+    """Warn if the force of the own field on a body is off by more than 1 %."""
+    worst = max(found, key=lambda each: each.error, default=None)
+    if worst is None or not worst.error > TRUSTED:
+        return
+    by = f"by about {worst.error:.0%}" if worst.error < 1.0 else "entirely"
+    warn_of_forces(
+        f"{where}: the force of the own field on {worst.body!r} is off {by}, as another body is about {worst.gap:.2g} m "
+        "away, much less than its edges are long, or passes through it. Take a finer mesh there, with edges of at most four "
+        "times the gap, or keep the bodies apart by a Contact"
+    )
