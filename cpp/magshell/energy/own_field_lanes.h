@@ -41,6 +41,12 @@ DualLanes<Value> inverse_root(const DualLanes<Value>& a) {
     return {root, Value(-0.5f) * (root * root * root) * a.rate};
 }
 
+/// Returns a SIMD vector with the same number in every lane; the compiler loads and copies it in one instruction.
+template <class Value, class Number>
+Value in_all_lanes(Number number) {
+    return Value(number - typename Value::Lanes{});
+}
+
 /// Returns a number between zero and one in every lane: the nearest one.
 template <class Value>
 Value clamped(const Value& a) {

@@ -18,8 +18,8 @@ void set_pairs(const std::vector<ElementPose<T>>& poses, const Units& units,
                const std::array<Index, 2>* pairs, const std::vector<Index>& numbers,
                const std::array<bool, 2>& are_edges, PairAdjoint<T>* out) {
     using Pairs = ElementPairs<T, Value>;
-    using Rows = ElementRows<typename Pairs::Pair::Number>;
-    static const Rows few(coarse), many(fine);
+    using Points = PointsOfKinds<typename Pairs::Pair::Number>;
+    static const Points few(coarse), many(fine);
     const Index count = static_cast<Index>(numbers.size());
     for (Index begin = 0; begin < count; begin += Pairs::width) {
         Pairs sums(units);

@@ -75,7 +75,7 @@ class SidePairs {
     using Pair = PairLanes<T, Value>;
     using Lanes = typename Pair::Lanes;
     using Vector = Triple<Lanes>;
-    using Rows = PointRows<typename Pair::Number>;
+    using Points = ElementPoints<typename Pair::Number>;
     static constexpr int width = Value::width;
 
     explicit SidePairs(const Units& units) : units_(units) {}
@@ -93,48 +93,54 @@ class SidePairs {
     }
 
     /// Adds P, over the points of the sides and these of the element.
-    void add_points(const Rows& rows) {
-        const auto number = [](double a) { return Value(Pair::number(a)); };
+    void add_points(const Points& points) {
+        const auto number = [](double a) { return in_all_lanes<Value>(Pair::number(a)); };
+        Vector positions[Points::most];
+        set_positions<Pair>(points, axes_, positions);
         for (const double zeta : {0.5, -0.5})
             for (const double* const weights : face_points) {
                 Vector at = Pair::scaled(number(zeta), level_);
                 for (int k = 0; k < 3; ++k) Pair::add_scaled(number(weights[k]), corners_[k], at);
-                const Vector pull =
-                    pull_at<Pair>(at, number(-2.0 / 3.0 * zeta), rows, axes_, points_.value, points_.by_axes);
-                for (int k = 0; k < 3; ++k) Pair::add_scaled(number(-weights[k]), pull, points_.by_corner[k]);
-                Pair::add_scaled(number(-zeta), pull, points_.by_level);
+                const PointSums<Lanes> sums = sums_at<Pair>(at, points, positions);
+                const auto pull = [&](int of_one, int of_a, int of_b) {  // sums of charges w d / |d|^3
+                    return Pair::scaled(
+                        number(-2.0 / 3.0 * zeta),
+                        sums.cubed[of_one] * at - sums.cubed[of_a] * axes_[0] - sums.cubed[of_b] * axes_[1]);
+                };
+                points_.value += number(-2.0 / 3.0 * zeta) * sums.inverse;
+                const Vector total = pull(0, 1, 2);
+                for (int k = 0; k < 3; ++k)
+                    Pair::add_scaled(number(-weights[k]), total, points_.by_corner[k]);
+                Pair::add_scaled(number(-zeta), total, points_.by_level);
+                points_.by_axes[0] += pull(1, 3, 4);
+                points_.by_axes[1] += pull(2, 4, 5);
             }
     }
 
     /// Adds A, over these points of the element.
-    void add_angles(const Rows& rows) {
-        const auto number = [](double a) { return Value(Pair::number(a)); };
+    void add_angles(const Points& points) {
+        const auto number = [](double a) { return in_all_lanes<Value>(Pair::number(a)); };
         const Vector normal = cross(corners_[1] - corners_[0], corners_[2] - corners_[0]);
+        Vector positions[Points::most];
+        set_positions<Pair>(points, axes_, positions);
         for (int s = 0; s < coarse.count; ++s) {
             const double zeta = coarse.points[s] - 0.5;
             Vector corners[3], of_level{};
             for (int k = 0; k < 3; ++k) corners[k] = corners_[k] + Pair::scaled(number(zeta), level_);
-            for (const auto& row : rows) {
-                const Vector along = Pair::scaled(Value(row.coordinate), axes_[0]);
-                Vector of_row{};
-                for (int i = row.first; i < row.last; ++i) {
-                    const Value coordinate(rows[i].coordinate);
-                    const Value weight = number(coarse.weights[s]) * Value(rows[i].weight);
-                    const Vector at = along + Pair::scaled(coordinate, axes_[1]);
-                    const Vector r[3] = {corners[0] - at, corners[1] - at, corners[2] - at};
-                    const SolidAngle<Pair> angle(r, normal);
-                    angles_.value += weight * angle.value;
-                    Vector sum{};
-                    for (int k = 0; k < 3; ++k) {
-                        const Vector by_corner = Pair::scaled(weight, angle.by_corner[k]);
-                        angles_.by_corner[k] += by_corner;
-                        sum += by_corner;
-                    }
-                    of_row += sum;
-                    Pair::add_scaled(-coordinate, sum, angles_.by_axes[1]);
+            for (int i = 0; i < points.count(); ++i) {
+                const Value weight = number(coarse.weights[s]) * in_all_lanes<Value>(points[i].weight);
+                const Vector r[3] = {corners[0] - positions[i], corners[1] - positions[i],
+                                     corners[2] - positions[i]};
+                const SolidAngle<Pair> angle(r, normal);
+                angles_.value += weight * angle.value;
+                Vector sum{};
+                for (int k = 0; k < 3; ++k) {
+                    Pair::add_scaled(weight, angle.by_corner[k], angles_.by_corner[k]);
+                    sum += angle.by_corner[k];
                 }
-                of_level += of_row;
-                Pair::add_scaled(-Value(row.coordinate), of_row, angles_.by_axes[0]);
+                Pair::add_scaled(weight, sum, of_level);
+                Pair::add_scaled(-weight * in_all_lanes<Value>(points[i].a), sum, angles_.by_axes[0]);
+                Pair::add_scaled(-weight * in_all_lanes<Value>(points[i].b), sum, angles_.by_axes[1]);
             }
             Pair::add_scaled(number(zeta), of_level, angles_.by_level);
         }

@@ -15,8 +15,8 @@ void set_sides(const std::vector<ElementPose<T>>& elements, const std::vector<Fa
                const Units& units, const std::array<Index, 2>* pairs, const std::vector<Index>& numbers,
                bool edges, bool meets, SideAdjoint<T>* out) {
     using Pairs = SidePairs<T, Value>;
-    using Rows = ElementRows<typename Pairs::Pair::Number>;
-    static const Rows few(coarse), many(fine);
+    using Points = PointsOfKinds<typename Pairs::Pair::Number>;
+    static const Points few(coarse), many(fine);
     const Index count = static_cast<Index>(numbers.size());
     for (Index begin = 0; begin < count; begin += Pairs::width) {
         Pairs sums(units);
