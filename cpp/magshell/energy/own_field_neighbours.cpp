@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 
 #include "magshell/energy/own_field_geometry.h"
 #include "magshell/mesh/box_tree.h"
@@ -24,24 +25,47 @@ struct Balls {
     }
 };
 
-// Returns for each ball the others that are near it, in ascending order; `wanted` says which of the balls are asked.
-template <class Wanted>
-std::vector<std::vector<Index>> near_balls(const Balls& of, const Balls& others, const Wanted& wanted) {
+// Returns the bounds of the centers in each node of a tree.
+std::vector<Bounds> bounds_of_centers(const BoxTree& tree, const std::vector<Vec3>& centers) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    std::vector<Bounds> bounds(tree.nodes().size(), {Vec3::Constant(infinity), Vec3::Constant(-infinity)});
+    for (std::size_t number = bounds.size(); number-- > 0;) {  // children follow their parents
+        const BoxTree::Node& node = tree.nodes()[number];
+        const auto include = [&](const Bounds& other) {
+            bounds[number] = {bounds[number].low.cwiseMin(other.low),
+                              bounds[number].high.cwiseMax(other.high)};
+        };
+        if (node.right >= 0) {
+            include(bounds[number + 1]);
+            include(bounds[node.right]);
+            continue;
+        }
+        for (Index i = node.first; i < node.first + node.count; ++i)
+            include({centers[tree.items()[i]], centers[tree.items()[i]]});
+    }
+    return bounds;
+}
+
+// Returns for each ball the others that are near it, in ascending order, of the first limit(k) ones.
+template <class Limit>
+std::vector<std::vector<Index>> near_balls(const Balls& of, const Balls& others, const Limit& limit) {
     std::vector<Bounds> boxes;
     for (std::size_t k = 0; k < others.centers.size(); ++k) boxes.push_back(others.box(k));
     const BoxTree tree(boxes, others.centers);
+    const std::vector<Bounds> center_bounds = bounds_of_centers(tree, others.centers);
     std::vector<std::vector<Index>> near(of.centers.size());
     in_blocks(static_cast<Index>(near.size()), [&](Index first, Index last) {
         std::vector<Index> open;
         for (Index k = first; k < last; ++k) {
-            if (!wanted(k)) continue;
-            const Bounds box = of.box(k);
+            const Index end = limit(k);
+            if (end == 0) continue;
+            const Bounds box = of.box(k), center{of.centers[k], of.centers[k]};
             open.assign(1, 0);
             while (!open.empty()) {
                 const Index number = open.back();
                 open.pop_back();
                 const BoxTree::Node& node = tree.nodes()[number];
-                if (!node.bounds.meets(box, 0.0)) continue;
+                if (!node.bounds.meets(center, 0.0) && !center_bounds[number].meets(box, 0.0)) continue;
                 if (node.right >= 0) {
                     open.push_back(number + 1);
                     open.push_back(node.right);
@@ -50,7 +74,7 @@ std::vector<std::vector<Index>> near_balls(const Balls& of, const Balls& others,
                 for (Index i = node.first; i < node.first + node.count; ++i) {
                     const Index j = tree.items()[i];
                     const double reach = std::max(of.radii[k], others.radii[j]);
-                    if ((of.centers[k] - others.centers[j]).squaredNorm() < reach * reach)
+                    if (j < end && (of.centers[k] - others.centers[j]).squaredNorm() < reach * reach)
                         near[k].push_back(j);
                 }
             }
@@ -86,10 +110,9 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
         side_elements.add(center, of_sides.far * element.length);
     }
     const std::vector<std::vector<Index>> near_elements =
-        near_balls(all, sources, [](Index) { return true; });
+        near_balls(all, sources, [](Index k) { return k; });  // those with a source come first
     for (Index k = 0; k < target_elements(targets); ++k)
-        for (const Index j : near_elements[k])
-            if (j < k) near.elements.push_back({k, j});  // elements with a source come first in the order
+        for (const Index j : near_elements[k]) near.elements.push_back({k, j});
     if (n_points() > most_direct && accuracy_ > 0.0) near.trees = trees(x, targets, accuracy_);
     if (!has_sides(targets)) return near;
     for (Index k = 0; k < target_faces(targets); ++k) {
@@ -97,7 +120,8 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
         side_faces.add(middle(face.nodes), of_sides.far * face.size);
     }
     const auto wanted = [&](Index k) { return targets == Targets::all || has_charge_[element_order_[k]]; };
-    const std::vector<std::vector<Index>> near_faces = near_balls(side_elements, side_faces, wanted);
+    const std::vector<std::vector<Index>> near_faces =
+        near_balls(side_elements, side_faces, [&](Index k) { return wanted(k) ? target_faces(targets) : 0; });
     for (Index k = 0; k < target_elements(targets); ++k)
         for (const Index j : near_faces[k]) near.sides.push_back({k, j});
     return near;
