@@ -1,4 +1,4 @@
-"""Cost of the own field: equilibria of a sheet with it over those without, and one evaluation for a large sheet.
+"""Cost of the own field: equilibria of a sheet with it over those without, one evaluation for a large sheet, and its modes.
 
 Run as `python -m benchmarks.own_field_costs`; with "quick" on a coarse mesh.
 """
@@ -61,8 +61,23 @@ def pass_time(cells: int) -> float:
         return time.process_time() - began
 
 
+def mode_times(cells: tuple[int, int]) -> tuple[int, float, float]:
+    """Return degrees of freedom of a strip, and seconds of the processor for four frequencies and two buckling factors."""
+    mesh = ms.meshes.rectangle(20e-3, 8e-3, cells=cells)
+    sheet = ms.Shell(mesh, thickness=4e-4, young_modulus=1e6, poisson_ratio=0.3, mass_density=2e3)
+    press = ms.EdgeLoad(mesh.edges_at(x=20e-3), (-1.0, 0.0, 0.0))
+    clamp = ms.Clamp(mesh.edges_at(x=0.0))
+    scene = ms.Scene(sheet, supports=clamp, loads=[press], own_field=ms.OwnField())
+    rest = ms.equilibrium(scene, remanent_magnetization=(0.0, 0.0, 4e4), load_factor=0.0, progress=False)
+    began = time.process_time()
+    ms.vibration_modes(scene, rest, count=4)
+    between = time.process_time()
+    ms.linear_buckling(scene, rest, load_factor=1.0, modes=2)
+    return scene._model.free_size, between - began, time.process_time() - between
+
+
 def main(quick: bool = False) -> None:
-    """Print both tables."""
+    """Print the tables."""
     ms.set_num_threads(1)
     cells = 16 if quick else 64
     rows = []
@@ -83,6 +98,12 @@ def main(quick: bool = False) -> None:
         "One evaluation of the forces of the own field at the accuracy 1e-6",
         ["faces", "s"],
         [[str(2 * each**2), f"{pass_time(each):.2f}"] for each in sizes],
+    )
+    meshes = [(8, 3)] if quick else [(24, 10), (44, 20)]
+    print_table(
+        "Modes of a strip in its own field",
+        ["degrees of freedom", "s of 4 frequencies", "s of 2 buckling factors"],
+        [[str(size), f"{first:.1f}", f"{second:.1f}"] for size, first, second in map(mode_times, meshes)],
     )
 
 

@@ -1,5 +1,8 @@
 // Binds factorizations of sparse symmetric matrices, thread counts, and the description of this build.
+#include <pybind11/functional.h>
+
 #include <algorithm>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
@@ -11,6 +14,7 @@
 #include "magshell/core/parallel.h"
 #include "magshell/linalg/build_info.h"
 #include "magshell/linalg/factor.h"
+#include "magshell/linalg/krylov/eigenvalue_count.h"
 #include "magshell/linalg/low_rank_factor.h"
 #include "magshell/linalg/pattern_checks.h"
 #include "magshell/linalg/residual.h"
@@ -58,7 +62,7 @@ class SharedFactor {
     }
 
     FactorReport factorize(const Array& values, const Eigen::MatrixXd& columns, const VectorXd& stiffness,
-                           const WeightedOperators& operators) {
+                           const WeightedOperators& operators, bool counted) {
         check_values(values);
         for (const auto& [weight, each] : operators)
             if (!each || each->size() != factor_->size())
@@ -84,6 +88,7 @@ class SharedFactor {
             const OperatorFactor::Operator sum =
                 operators.empty() ? OperatorFactor::Operator() : sum_of(operators);
             operated_->set_operator(sum, sum);
+            operated_->set_count_deferred(!counted);
         }
         std::copy_n(values.data(), values.size(), factor_->values().begin());
         return factor_->factorize();
@@ -105,6 +110,16 @@ class SharedFactor {
         Array result(std::vector<py::ssize_t>(rhs.shape(), rhs.shape() + rhs.ndim()));
         Eigen::Map<RowMajor>(result.mutable_data(), rhs.shape(0), columns) = solution;
         return result;
+    }
+
+    VectorXd solve_approximately(VectorXd rhs, double tolerance) const {
+        if (rhs.size() != factor_->size())
+            throw InvalidInput("the right-hand side must have shape (" + std::to_string(factor_->size()) +
+                               ",), got " + std::to_string(rhs.size()));
+        const py::gil_scoped_release release;
+        const std::shared_lock lock(mutex_);
+        factor_->solve_approximately(rhs, tolerance);
+        return rhs;
     }
 
     VectorXd residual(const Array& values, const VectorXd& x, const VectorXd& rhs) const {
@@ -165,15 +180,21 @@ void register_linalg(py::module_& module) {
 
     py::class_<SharedFactor>(
         module, "Factor", "An analysed sparse symmetric pattern; factorize() it with values, then solve().")
-        .def("factorize", &SharedFactor::factorize, py::arg("values"),
-             py::arg("columns") = Eigen::MatrixXd(0, 0), py::arg("stiffness") = VectorXd(0),
-             py::arg("operators") = WeightedOperators(),
-             "Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with "
-             "columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T; and with operators "
-             "[(weight, OperatorPart)]: solves are iterative then, and equal negative eigenvalues count "
-             "once.")
+        .def(
+            "factorize", &SharedFactor::factorize, py::arg("values"),
+            py::arg("columns") = Eigen::MatrixXd(0, 0), py::arg("stiffness") = VectorXd(0),
+            py::arg("operators") = WeightedOperators(), py::arg("counted") = true,
+            "Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with "
+            "columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T; and with operators "
+            "[(weight, OperatorPart)]: solves are iterative then, and equal negative eigenvalues count "
+            "once. counted: whether the report counts the negative eigenvalues of the whole; otherwise those "
+            "without the operators.")
         .def("solve", &SharedFactor::solve, py::arg("rhs"),
              "The solution for the right-hand side (n,) or (n, k).")
+        .def(
+            "solve_approximately", &SharedFactor::solve_approximately, py::arg("rhs"), py::arg("tolerance"),
+            "The solution for the right-hand side (n,). An iterative solve leaves a residual of at most this "
+            "part of it.")
         .def("residual", &SharedFactor::residual, py::arg("values"), py::arg("solution"), py::arg("rhs"),
              "rhs (n,) minus the matrix with these values (nnz,) times a solution (n,), added up in as many "
              "digits as the "
@@ -198,6 +219,20 @@ void register_linalg(py::module_& module) {
         py::arg("ordering") = "best", py::arg("points") = py::none(),
         "Orders and analyses the lower triangle of a symmetric pattern, given by columns: sorted rows, "
         "diagonal present. points (n, 3): where the unknowns are, which makes for better orderings.");
+
+    using Image = std::function<VectorXd(const VectorXd&)>;
+    module.def(
+        "directions_below",
+        [](const Image& solve, const Image& product, const VectorXd& diagonal, double bound) {
+            const EigenvalueCount count = count_below([&](VectorXd& x) { x = solve(x); }, diagonal, product,
+                                                      bound, /*with_directions=*/true);
+            return py::make_tuple(count.settled, count.directions);
+        },
+        py::arg("solve"), py::arg("product"), py::arg("diagonal"), py::arg("bound"),
+        "Looks for eigenvalues of A^-1 H below a bound, for a positive definite A (n, n) that is known by "
+        "solves and its diagonal (n,), and a symmetric H that is known by products. Returns whether none was "
+        "missed, with an estimated probability of 1e-3, and approximate eigenvectors (n, k), one for equal "
+        "eigenvalues.");
 
     module.def("factor_backends", [] {
         std::vector<std::string> built;

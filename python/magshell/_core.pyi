@@ -52,6 +52,7 @@ __all__: list[str] = [
     "analyze",
     "at_nodes",
     "build_info",
+    "directions_below",
     "distances",
     "drag_faces",
     "drag_gradients",
@@ -150,9 +151,10 @@ class Factor:
         operators: collections.abc.Sequence[
             tuple[typing.SupportsFloat | typing.SupportsIndex, OperatorPart]
         ] = [],
+        counted: bool = True,
     ) -> FactorReport:
         """
-        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T; and with operators [(weight, OperatorPart)]: solves are iterative then, and equal negative eigenvalues count once.
+        Factorizes the matrix with these values (nnz,), in the order of the pattern's rows, and with columns u (n, k) of stiffnesses s (k,) beside it: plus the sum of s u u^T; and with operators [(weight, OperatorPart)]: solves are iterative then, and equal negative eigenvalues count once. counted: whether the report counts the negative eigenvalues of the whole; otherwise those without the operators.
         """
     def residual(
         self,
@@ -166,6 +168,14 @@ class Factor:
     def solve(self, rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.ndarray:
         """
         The solution for the right-hand side (n,) or (n, k).
+        """
+    def solve_approximately(
+        self,
+        rhs: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        tolerance: typing.SupportsFloat | typing.SupportsIndex,
+    ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        The solution for the right-hand side (n,). An iterative solve leaves a residual of at most this part of it.
         """
     @property
     def bytes(self) -> int: ...
@@ -1179,6 +1189,22 @@ def at_nodes(
     """
 
 def build_info() -> list[tuple[str, str]]: ...
+def directions_below(
+    solve: collections.abc.Callable[
+        [typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]],
+        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ],
+    product: collections.abc.Callable[
+        [typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]],
+        typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ],
+    diagonal: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    bound: typing.SupportsFloat | typing.SupportsIndex,
+) -> tuple[bool, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]]:
+    """
+    Looks for eigenvalues of A^-1 H below a bound, for a positive definite A (n, n) that is known by solves and its diagonal (n,), and a symmetric H that is known by products. Returns whether none was missed, with an estimated probability of 1e-3, and approximate eigenvectors (n, k), one for equal eigenvalues.
+    """
+
 def distances(
     obstacle: Obstacle, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
 ) -> tuple[typing.Any, ...]:

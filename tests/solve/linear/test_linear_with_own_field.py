@@ -210,8 +210,13 @@ def test_buckling_factors_equal_those_of_a_dense_decomposition():
     scene = flaps(force=(-0.02, 0, 0))
     rest = ms.equilibrium(scene, remanent_magnetization=oblique(scene), load_factor=0.0, progress=False)
     found = ms.linear_buckling(scene, rest, load_factor=1.0, modes=3)
-    response = ms.linear_response(scene, rest, load_factor=1.0)
-    model = scene._model
+    np.testing.assert_allclose(found.factors, dense_factors(rest, 1.0)[:3], rtol=1e-5)
+
+
+def dense_factors(rest, load_factor):
+    """Return all positive factors of the way to a load factor, ascending, by a decomposition of dense matrices."""
+    scene, model = rest.scene, rest.scene._model
+    response = ms.linear_response(scene, rest, load_factor=load_factor)
     step = 1e-6 / np.abs(response.displacements).max()
     along = model.state(
         scene.mesh.rest_positions + response.displacements, np.asarray(response.edge_rotations)
@@ -222,7 +227,55 @@ def test_buckling_factors_equal_those_of_a_dense_decomposition():
         for t in (step, -step)
     )
     inverses = scipy.linalg.eigh(-(ahead - behind) / (2 * step), dense_stiffness(rest), eigvals_only=True)
-    np.testing.assert_allclose(found.factors, 1.0 / inverses[::-1][:3], rtol=1e-5)
+    return 1.0 / inverses[inverses > 0.0][::-1]
+
+
+@pytest.mark.usefixtures("dense")
+def test_modes_where_the_own_field_alone_holds_a_strip():
+    """Check a strip under a load at which it would buckle without its own field, so that the sparse matrix is indefinite."""
+    scene = strip(4e-3, (8, 2), length=20e-3)
+    factor = ms.linear_buckling(scene, at_rest(scene), load_factor=1.0).factors[0]
+    given = {"remanent_magnetization": ACROSS, "progress": False}
+    pressed = ms.equilibrium(scene, load_factor=0.8 * factor, **given)
+    parts = stiffness_parts(scene._model, pressed._state, pressed._load_parameters)
+    assert np.linalg.eigvalsh(symmetric(*parts.triangle).toarray())[0] < 0.0
+    np.testing.assert_allclose(
+        ms.vibration_modes(scene, pressed, count=3).squares, dense_squares(pressed)[:3], rtol=1e-8
+    )
+    found = ms.linear_buckling(scene, pressed, load_factor=factor, modes=2).factors
+    assert found[0] == pytest.approx(1.0, rel=1e-3)  # what happens before buckling is not quite linear
+    np.testing.assert_allclose(found, dense_factors(pressed, factor)[:2], rtol=1e-5)
+
+
+def test_large_scenes_have_the_gradients_of_small_ones(monkeypatch):
+    """Check the gradients of modes found by products against those of a dense decomposition, which the net checks."""
+    scene = flaps(force=(-0.02, 0, 0))
+    gradients = []
+    for most_dense in (10**6, 0):
+        monkeypatch.setattr("magshell.solve.adjoint.factorized._MOST_DENSE", most_dense)
+        magnetization = torch.tensor(oblique(scene), requires_grad=True)
+        rest = ms.equilibrium(
+            scene,
+            remanent_magnetization=magnetization,
+            load_factor=0.0,
+            solver=ms.MixedNewton(tolerance=1e-13),
+            progress=False,
+        )
+        squares = ms.vibration_modes(scene, rest, count=2).squares
+        factors = ms.linear_buckling(scene, rest, load_factor=1.0, modes=2).factors
+        gradients.append(
+            [torch.autograd.grad(each[1], magnetization, retain_graph=True)[0] for each in (squares, factors)]
+        )
+    for ours, exact in zip(*reversed(gradients), strict=True):
+        assert float(exact.abs().max()) > 0.0
+        np.testing.assert_allclose(ours, exact, rtol=0, atol=1e-8 * float(exact.abs().max()))
+
+
+@pytest.mark.usefixtures("dense")
+def test_a_pulled_strip_with_its_own_field_does_not_buckle():
+    scene = strip(4e-3, (4, 1), length=20e-3)
+    with pytest.raises(ValueError, match="nothing buckles"):
+        ms.linear_buckling(scene, at_rest(scene), load_factor=-1.0)
 
 
 @pytest.mark.parametrize("at_rest", [True, False])

@@ -161,5 +161,5 @@ def through_equilibrium(residual: Residual, derivatives: Derivatives) -> Derivat
 def multiplier_of(residual: Residual, by_state: np.ndarray) -> np.ndarray:
     """Return the solution w of K w = -by_state for the free unknowns, of all unknowns, with the stiffness K there."""
     model = residual.inputs.scene._model
-    stiffness = Factorized(residual.hessian(), model.free_points)
+    stiffness = Factorized(residual.hessian(), model.free_points, counted=False)
     return model.expand(stiffness.solve(-model.reduce(by_state)))

@@ -9,10 +9,12 @@ import numpy as np
 from ... import _core
 
 _SMALL = 20000  # degrees of freedom, up to which trying two orderings costs more than the better one saves
-# Degrees of freedom up to which an eigenvalue problem takes operators as dense matrices: one product for each of them.
-# Lanczos' method with iterative solves takes some thousand products; see
-# test_frequencies_equal_those_of_a_dense_decomposition.
-_MOST_DENSE = 3000
+# Degrees of freedom up to which an eigenvalue problem takes operators as dense matrices: one product for each of them. A
+# search takes as many products for a few modes; see test_frequencies_equal_those_of_a_dense_decomposition.
+_MOST_DENSE = 200
+# Residual of an iterative solve over the right-hand side. Each of two solves has it, so that together they have its square;
+# see test_operator_factor_solves_and_counts_as_the_dense_matrix.
+_PART = 1e-7
 
 
 class StiffnessParts(NamedTuple):
@@ -63,25 +65,26 @@ class Factorized:
     """A factorized symmetric matrix with further parts, which solves to more digits than the factorization has.
 
     points: (n, 3) m, where the degrees of freedom are. report: of the factorization. With operators solves are iterative,
-    and equal negative eigenvalues count once in the report.
+    and equal negative eigenvalues count once in the report. counted: whether the report is needed; a count with operators
+    takes as many products as a solve.
     """
 
-    def __init__(self, parts: StiffnessParts, points: np.ndarray):
+    def __init__(self, parts: StiffnessParts, points: np.ndarray, counted: bool = True):
         self._parts = parts
         *pattern, self._values = parts.triangle
         self._factor = analyzed(*pattern, points)
-        self.report: _core.FactorReport = factorize(self._factor, parts)
+        self.report: _core.FactorReport = factorize(self._factor, parts, counted)
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """Solve, with one refinement by a residual of more digits.
 
         Without it, where stiffnesses differ by 1e6, the digits of the soft ones would depend on the order of elimination.
         """
-        solution = self._factor.solve(forces)
+        solution = self._factor.solve_approximately(forces, _PART)
         left = self._factor.residual(self._values, solution, forces)
         if self._parts.low_rank or self._parts.operators:
             left = left - self._parts.times_others(solution)
-        return solution + self._factor.solve(left)
+        return solution + self._factor.solve_approximately(left, _PART)
 
 
 def analyzed(size: int, starts: np.ndarray, rows: np.ndarray, points: np.ndarray) -> _core.Factor:
@@ -89,9 +92,9 @@ def analyzed(size: int, starts: np.ndarray, rows: np.ndarray, points: np.ndarray
     return _core.analyze(size, starts, rows, points=points, ordering="amd" if size <= _SMALL else "best")
 
 
-def factorize(factor: _core.Factor, parts: StiffnessParts) -> _core.FactorReport:
-    """Factorize a matrix with its further parts, in the pattern that was analyzed."""
-    return factor.factorize(parts.triangle[3], *parts.low_rank, operators=parts.operators)
+def factorize(factor: _core.Factor, parts: StiffnessParts, counted: bool = True) -> _core.FactorReport:
+    """Factorize a matrix with its further parts, in the pattern that was analyzed. counted: as in Factorized."""
+    return factor.factorize(parts.triangle[3], *parts.low_rank, operators=parts.operators, counted=counted)
 
 
 def times_low_rank(low_rank: tuple[np.ndarray, ...], vector: np.ndarray) -> np.ndarray:

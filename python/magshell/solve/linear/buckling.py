@@ -23,6 +23,7 @@ from ..adjoint.factorized import StiffnessParts, stiffness_parts
 from ..statics.equilibrium import Equilibrium
 from .base_state import StiffnessAbout, leaves_of, linear_inputs, residual_of
 from .mode_shapes import mode_shapes
+from .operator_pencils import OperatorBucklingPencil
 from .rest import RestStiffness, pulling_parts, refuse_springs
 from .stiffness import Stiffness
 
@@ -34,10 +35,6 @@ _LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a numb
 _ROUND_OFF = 1e-14  # of a length: what moves no more does not move
 _PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
 _LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
-
-
-_SAME = 1e-6  # of a factor: another one that is less below it is taken for it
-_ROUGH = 1e-3  # of an eigenvalue, where only its side of a bound counts
 
 
 @immutable
@@ -315,68 +312,51 @@ def _lowest(
 
     max_displacement: m, before buckling; factors that would need more are left out.
     """
-    pencil = BucklingPencil(stiffness, change)
+    has_operators = bool(change.operators or stiffness.parts.operators)
+    pencil = (OperatorBucklingPencil if has_operators else BucklingPencil)(stiffness, change)
     try:
-        # By Sylvester's law, K + lambda dK has as many negative directions as there are factors between 0 and
-        # lambda. The search ends where the theory does: factors beyond belong to strains of order one, are closely
-        # spaced and mean nothing.
+        # The search ends where the theory does: factors beyond belong to strains of order one, are closely spaced and mean
+        # nothing.
         of_extreme = 1e3 / pencil.extreme()
         largest = min(of_extreme, max_displacement / displacement if displacement > 0.0 else np.inf)
-        available = stiffness.negative_directions(change, largest)
-        if available == 0:
-            raise ValueError(
-                "nothing buckles under these load parameters, as far as linear theory reaches; under reversed ones it may"
-            )
-        factors, modes = pencil.lowest(min(count, available))
-        if change.operators or stiffness.parts.operators:  # equal negative directions counted once
-            factors, modes = pencil.with_missing(factors, modes, count, largest)
+        factors, modes = pencil.lowest(count, largest)
     except scipy.sparse.linalg.ArpackError as error:
         raise NotConverged(f"the buckling modes did not converge: {error}. Ask for fewer modes.") from error
+    if len(factors) == 0:
+        raise ValueError(
+            "nothing buckles under these load parameters, as far as linear theory reaches; under reversed ones it may"
+        )
     return factors, modes
 
 
 class BucklingPencil:
-    """A positive definite K and its change dK: -dK v = (1/f) K v, so that the smallest positive factors f are the largest
-    eigenvalues.
+    """A positive definite K and its change dK without operators: -dK v = (1/f) K v, so that the smallest positive factors f
+    are the largest eigenvalues.
     """
 
     def __init__(self, stiffness: Stiffness, change: StiffnessParts):
-        matrix = stiffness.matrix
+        self._whole, self._change = stiffness, change
+        matrix, parts = stiffness.matrix, stiffness.parts
         self._size = matrix.shape[0]
         self._solve = stiffness.solve
-        self._stiffness = self._completed(matrix, stiffness.parts, 1.0)
-        self._negative_change = self._completed(-stiffness.with_values(change.triangle[3]), change, -1.0)
+        self._stiffness = matrix
+        if parts.low_rank:
+            self._stiffness = self._operator(lambda v: matrix @ v + parts.times_others(v))
+        self._negative_change = -stiffness.with_values(change.triangle[3])
 
     def extreme(self) -> float:
         """Return the inverse of the factor nearest to zero, of either sign, by its size."""
         return abs(self._search(self._negative_change, 1, which="LM", return_eigenvectors=False)[0])
 
-    def lowest(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the smallest positive factors (k,), ascending, and their modes (n, k) with v . K v = 1."""
+    def lowest(self, count: int, largest: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the smallest positive factors (k,) up to the largest one, ascending, and modes (n, k) with v . K v = 1."""
+        # By Sylvester's law, K + f dK has as many negative directions as there are factors between 0 and f.
+        count = min(count, self._whole.negative_directions(self._change, largest))
+        if count == 0:
+            return np.zeros(0), np.zeros((self._size, 0))
         inverses, vectors = self._search(self._negative_change, count, which="LA")
         order = np.argsort(-inverses)
         return 1.0 / inverses[order], vectors[:, order]
-
-    def with_missing(
-        self, factors: np.ndarray, modes: np.ndarray, count: int, largest: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return up to `count` factors with those below `largest` that a search has missed: equal ones, say.
-
-        A search for the next one among what is orthogonal to the modes (Parlett, The Symmetric Eigenvalue Problem, 5.2) does
-        not miss it, as it is simple or one of several equal ones.
-        """
-        while True:
-            bound = 1.0 / (largest if len(factors) < count else factors[-1] * (1.0 - _SAME))
-            further = self._without(factors, modes)
-            (inverse,), _ = self._search(further, 1, which="LA", tol=_ROUGH)
-            if inverse * (1.0 + 2.0 * _ROUGH) > bound:
-                (inverse,), vectors = self._search(further, 1, which="LA")
-                if inverse > bound:
-                    factors, modes = np.append(factors, 1.0 / inverse), np.hstack([modes, vectors])
-                    order = np.argsort(factors)[:count]
-                    factors, modes = factors[order], modes[:, order]
-                    continue
-            return factors, modes
 
     def _search(self, negative_change: Any, count: int, **options: Any) -> Any:
         start = np.random.default_rng(0).standard_normal(self._size)  # one that no symmetry is orthogonal to
@@ -388,17 +368,6 @@ class BucklingPencil:
             v0=start,
             **options,
         )
-
-    def _completed(self, matrix: scipy.sparse.csc_array, parts: StiffnessParts, sign: float) -> Any:
-        """Return a matrix with the parts that are not in it, times a sign."""
-        if not parts.operators and not parts.low_rank:
-            return matrix
-        return self._operator(lambda v: matrix @ v + sign * parts.times_others(v))
-
-    def _without(self, factors: np.ndarray, modes: np.ndarray) -> Any:
-        """Return -dK with the eigenvalue zero for these modes."""
-        forces = np.stack([self._stiffness @ mode for mode in modes.T], axis=1)
-        return self._operator(lambda v: self._negative_change @ v - forces @ (forces.T @ v / factors))
 
     def _operator(self, product: Callable[[np.ndarray], np.ndarray]) -> scipy.sparse.linalg.LinearOperator:
         return scipy.sparse.linalg.LinearOperator(

@@ -41,7 +41,7 @@ class RestStiffness(Stiffness):
         if not self.factorized:
             found = model.small_deflection(self.state, self.load_parameters, inputs.load_parameters, at_rest)
             if not len(motion := found.motion):
-                refuse_indefinite(found.report, found.unknowns, self._where)
+                refuse_indefinite(found.report, found.unknowns, self.where)
             return motion
         moved = model.prescribed_rate(self.load_parameters) * layout.of(
             inputs.load_parameters, "scene", "support_factor"

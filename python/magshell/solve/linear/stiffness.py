@@ -35,9 +35,14 @@ class _Factorized(Factorized):
         refuse_indefinite(self.report, parts.triangle[0], where)
 
 
+def is_positive_definite(report: _core.FactorReport) -> bool:
+    """Return whether a factorization has shown that the matrix is positive definite."""
+    return report.succeeded and not report.negative_pivots and not report.perturbed_pivots
+
+
 def refuse_indefinite(report: _core.FactorReport, size: int, where: str) -> None:
     """Raise IndefiniteStiffness if a factorization has shown that the matrix is not positive definite."""
-    if not report.succeeded or report.negative_pivots or report.perturbed_pivots:
+    if not is_positive_definite(report):
         raise IndefiniteStiffness(
             f"the stiffness {where} is not positive definite ({report.negative_pivots} negative and "
             f"{report.perturbed_pivots} zero pivots of {size}), and linear theory needs that: add supports"
@@ -54,7 +59,8 @@ class Stiffness:
     """
 
     def __init__(self, scene: Scene, state: np.ndarray, load_parameters: np.ndarray, where: str):
-        self._scene, self._where = scene, where
+        self._scene = scene
+        self.where: str = where
         self._factorizing = threading.Lock()
         self.state: np.ndarray = state
         self.load_parameters: np.ndarray = load_parameters
@@ -64,6 +70,11 @@ class Stiffness:
     def _model(self) -> _core.Model:
         """The model of the core that this thread uses."""
         return self._scene._model
+
+    @property
+    def points(self) -> np.ndarray:
+        """The places of the free degrees of freedom, (n, 3) m."""
+        return self._model.free_points
 
     @functools.cached_property
     def parts(self) -> StiffnessParts:
@@ -84,23 +95,20 @@ class Stiffness:
         """Return the symmetric matrix (n, n) whose lower triangle has the pattern of K and these nonzeros."""
         return symmetric(*self.parts.triangle[:3], values)
 
-    def negative_directions(self, change: StiffnessParts, factor: float) -> int:
-        """Count the negative eigenvalues of K plus a multiple of a change, by another factorization. With operators equal
-        ones count once.
-        """
+    def moved(self, change: StiffnessParts, factor: float) -> StiffnessParts:
+        """Return K plus a multiple of a change, both without their operators."""
         *pattern, values = self.parts.triangle
-        operators = (
-            *self.parts.operators,
-            *((factor * weight, operator) for weight, operator in change.operators),
-        )
-        moved = self.parts._replace(
-            triangle=(*pattern, values + factor * change.triangle[3]), operators=operators
-        )
-        return factorize(analyzed(*pattern, self._model.free_points), moved).negative_pivots
+        triangle = (*pattern, values + factor * change.triangle[3])
+        return self.parts._replace(triangle=triangle, operators=())
+
+    def negative_directions(self, change: StiffnessParts, factor: float) -> int:
+        """Count the negative eigenvalues of K plus a multiple of a change, without operators, by another factorization."""
+        moved = self.moved(change, factor)
+        return factorize(analyzed(*moved.triangle[:3], self.points), moved).negative_pivots
 
     def dense(self) -> Stiffness:
         """Return the same, not factorized, with a matrix of full pattern, which contains the operators."""
-        same = Stiffness(self._scene, self.state, self.load_parameters, self._where)
+        same = Stiffness(self._scene, self.state, self.load_parameters, self.where)
         vars(same)["parts"] = self.parts.dense()
         return same
 
@@ -120,7 +128,7 @@ class Stiffness:
     def _factor(self) -> _Factorized:
         with self._factorizing:
             if self._whole is None:
-                self._whole = _Factorized(self.parts, self._model.free_points, self._where)
+                self._whole = _Factorized(self.parts, self.points, self.where)
             return self._whole
 
     def answer(self, forces: np.ndarray, moved: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from ..adjoint.residual import Residual
 from ..statics.equilibrium import Equilibrium
 from .base_state import idle_inputs, inputs_about, set_state
 from .mode_shapes import mode_shapes
+from .operator_pencils import OperatorVibrationPencil
 from .rest import refuse_what_acts
 from .stiffness import symmetric
 from .vibration_pencil import VibrationPencil
@@ -211,7 +212,8 @@ def vibration_modes(
     slow = min(map(_slow_square, inputs.values.deformable), default=1.0)
     if consistent is not None:
         inertia = nonzeros_in_pattern(consistent, *stiffness.triangle[1:3])
-    pencil = VibrationPencil(stiffness, model.free_points, masses, slow, inertia, consistent)
+    kind = OperatorVibrationPencil if stiffness.operators else VibrationPencil
+    pencil = kind(stiffness, model.free_points, masses, slow, inertia, consistent)
     next_too = bool(inputs.leaves) and count + 1 < np.count_nonzero(masses)  # whether the last one is simple
     squares, vectors = pencil.lowest(int(count) + next_too)
     modes, edge_rotations = mode_shapes(model, vectors[:, : int(count)])
