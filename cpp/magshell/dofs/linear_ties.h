@@ -4,6 +4,8 @@
 //
 // With the matrix T of this sum, u = T z for the free dofs z: forces are T^T f, matrices T^T K T. A tied dof couples dofs that share no
 // element, such as those of two opposite sides of a periodic cell. Nodes with a frame of their own are tied along its axes.
+//
+// This class adds up the part of the w_j. DofMap (dof_map.h) adds the part of the moves, since it knows the supports.
 #pragma once
 
 #include <map>

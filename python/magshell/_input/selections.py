@@ -18,18 +18,21 @@ _OTHERWISE = {
 class Indices(np.ndarray):
     """An integer array that knows which entities it counts, so that vertex indices passed as edges raise an error.
 
-    Slices keep the kind; results of arithmetic are plain arrays. kind: one of KINDS.
+    Slices keep the kind; results of arithmetic are plain arrays. kind: one of KINDS. total: how many there are in the mesh
+    on which they were selected, None if not known.
     """
 
     kind: str | None
+    total: int | None
 
-    def __new__(cls, values: Any, kind: str | None = None) -> Indices:
+    def __new__(cls, values: Any, kind: str | None = None, total: int | None = None) -> Indices:
         made = np.asarray(values).view(cls)
-        made.kind = kind
+        made.kind, made.total = kind, total
         return made
 
     def __array_finalize__(self, made_from: Any) -> None:
         self.kind = getattr(made_from, "kind", None)
+        self.total = getattr(made_from, "total", None)
 
     def __array_ufunc__(self, ufunc, method, *inputs, **options):
         def plain(values):
@@ -74,6 +77,8 @@ def selection(name: str, values: Any, of: str | None = None) -> np.ndarray:
         what = f"{values!r:.60}" if np.ndim(values) == 0 else f"{array.dtype} of shape {array.shape}"
         raise ValueError(f"{name} must be integer indices of shape (k,), got {what}")
     own = array.copy()  # the caller may change its array later
+    if isinstance(values, Indices):
+        own = Indices(own, values.kind, values.total)
     own.setflags(write=False)
     return own
 
@@ -83,9 +88,24 @@ def count_of(selected: np.ndarray) -> int:
     return int(np.count_nonzero(selected)) if selected.dtype == bool else len(selected)
 
 
+def _check_mesh(name: str, values: np.ndarray, count: int) -> None:
+    """Raise ValueError if faces or edges were selected on a mesh with another number of them.
+
+    Corners have the same numbers in a mesh of four-node and in one of ten-node tetrahedra, faces and edges have not.
+    """
+    kind, total = getattr(values, "kind", None), getattr(values, "total", None)
+    if kind in ("faces", "edges") and total is not None and total != count and values.dtype != bool:
+        raise ValueError(
+            f"{name} were selected on a mesh that has {total} {kind}, and the mesh of the body has {count}: select on that, "
+            f"as in solid.mesh.{kind}_at(...) or solid.mesh.{kind}_in(...). A quadratic Solid makes ten-node tetrahedra of "
+            "its mesh"
+        )
+
+
 def indices(name: str, array: np.ndarray, count: int) -> np.ndarray:
     """Return a selection as distinct int64 indices into `count` entities, (k,) with k > 0. Raises ValueError on a bad
-    index."""
+    index, and for faces or edges that were selected on another mesh."""
+    _check_mesh(name, array, count)
     if array.dtype == bool:
         if array.shape != (count,):
             raise ValueError(f"{name}: a mask must have shape ({count},), got {array.shape}")

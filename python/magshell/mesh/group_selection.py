@@ -88,7 +88,7 @@ class GroupSelection(MeshSelection):
         found = self._in(group)
         edges = self._edge_numbers(found)
         nodes = [found.vertices, *(self.edges[edges].T), *self._nodes_inside(edges, found)]
-        return Indices(np.unique(np.concatenate(nodes)).astype(np.int64), "vertices")
+        return Indices(np.unique(np.concatenate(nodes)).astype(np.int64), "vertices", self.n_vertices)
 
     def edges_in(self, group: str | Sequence[str]) -> np.ndarray:
         """Select the edges of a named group, or of several: its own, and those of its faces and tetrahedra.
@@ -101,7 +101,7 @@ class GroupSelection(MeshSelection):
                 f"group {group!r} has no edges, only vertices: mesh.edges_between(mesh.vertices_in({group!r})) are the "
                 "edges between them"
             )
-        return Indices(found, "edges")
+        return Indices(found, "edges", len(self.edges))
 
     def faces_in(self, group: str | Sequence[str]) -> np.ndarray:
         """Select the faces of a named group, or of several; of a solid, those on its surface.
@@ -124,7 +124,7 @@ class GroupSelection(MeshSelection):
         found = rows_among(self.faces, given, self.n_vertices)
         if len(found) == 0:
             raise ValueError(f"no face has all its vertices among the {len(given)} given")
-        return Indices(found, "faces")
+        return Indices(found, "faces", len(self.faces))
 
     def _sides_in(self, group: str | Sequence[str]) -> np.ndarray:
         """Return the sides, rows of `_corners_of_sides`, in a group; see `faces_in`."""
@@ -192,7 +192,7 @@ class GroupSelection(MeshSelection):
         """Return the numbers of the flat faces on the given sides; a side of six nodes has four."""
         if self._middle_nodes is not None:
             sides = (4 * sides[:, None] + np.arange(4)).ravel()
-        return Indices(sides, kind)
+        return Indices(sides, kind, len(self.faces))
 
     def _members_of(self, name: str, value: Any) -> Members:
         """Return the members that `with_groups` got as a selection or a dictionary of selections."""

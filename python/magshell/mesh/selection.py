@@ -54,7 +54,7 @@ class MeshSelection:
         found = np.flatnonzero(self._matches(wanted, tolerance))
         if len(found) == 0:
             raise ValueError(self._nothing_at("vertex", wanted, tolerance))
-        return Indices(found, "vertices")
+        return Indices(found, "vertices", self.n_vertices)
 
     def edges_at(
         self,
@@ -96,9 +96,8 @@ class MeshSelection:
             return _where("edge", predicate, self.edge_midpoints, np.arange(self.n_edges))
         if len(self.boundary_edges) == 0:
             raise ValueError("the mesh is closed: it has no boundary edges")
-        return _where(
-            "boundary edge", predicate, self.edge_midpoints[self.boundary_edges], self.boundary_edges
-        )
+        boundary = self.boundary_edges
+        return _where("boundary edge", predicate, self.edge_midpoints[boundary], boundary, self.n_edges)
 
     def faces_where(self, predicate: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Select the faces for which `predicate` is True; it maps barycenters (n_f, 3) [m] to booleans (n_f,)."""
@@ -120,7 +119,7 @@ class MeshSelection:
         found = rows_among(self.edges, indices, self.n_vertices)
         if len(found) == 0:
             raise ValueError(f"no edge joins two of the {len(indices)} vertices given")
-        return Indices(found, "edges")
+        return Indices(found, "edges", self.n_edges)
 
     def _coordinates(self, x, y, z, tolerance) -> tuple[dict[int, float], float]:
         wanted = {
@@ -149,7 +148,7 @@ class MeshSelection:
             )
         if len(found) == 0:
             raise ValueError(self._nothing_at(kind, wanted, tolerance))
-        return Indices(found, _PLURAL[kind])
+        return Indices(found, _PLURAL[kind], len(members))
 
     def _nothing_at(self, kind: str, wanted: dict[int, float], tolerance: float) -> str:
         axes, values = list(wanted), list(wanted.values())
@@ -166,7 +165,13 @@ def _describe(coordinates: dict[int, float]) -> str:
     return ", ".join(f"{'xyz'[axis]} = {value:.9g}" for axis, value in coordinates.items())
 
 
-def _where(kind: str, predicate: Callable[..., Any], points: np.ndarray, indices: np.ndarray) -> np.ndarray:
+def _where(
+    kind: str,
+    predicate: Callable[..., Any],
+    points: np.ndarray,
+    indices: np.ndarray,
+    total: int | None = None,
+) -> np.ndarray:
     mask = np.asarray(predicate(points))
     if mask.shape != (len(points),) or mask.dtype != bool:
         raise ValueError(
@@ -177,7 +182,7 @@ def _where(kind: str, predicate: Callable[..., Any], points: np.ndarray, indices
         low, high = points.min(axis=0), points.max(axis=0)
         spans = ", ".join(f"{name} {low[i]:.6g} to {high[i]:.6g}" for i, name in enumerate("xyz"))
         raise ValueError(f"the predicate holds for no {kind}; they span {spans} m")
-    return Indices(indices[mask], _PLURAL[kind.split()[-1]])
+    return Indices(indices[mask], _PLURAL[kind.split()[-1]], len(points) if total is None else total)
 
 
 def rows_among(rows: np.ndarray, vertices: np.ndarray, n_vertices: int) -> np.ndarray:

@@ -212,3 +212,25 @@ def test_coat_of_a_solid_has_the_same_strain(element):
     assert np.allclose(rest[bar].positions, x * (stretch, thinner, thinner), rtol=0, atol=1e-9 * length)
     energy = 0.5 * strain**2 * length * (1e6 * side**2 + 1e8 * 1e-4 * side)
     assert sum(rest.energies.values()) == pytest.approx(energy, rel=1e-8)
+
+
+def test_corners_of_quadratic_solids_alone_are_refused_by_ties_and_rigid_bodies():
+    """Check vertices that were selected on the mesh of four-node tetrahedra, which leave the nodes between them free."""
+    meshes = [
+        ms.meshes.box((0.2, 0.1, 0.1), cells=(2, 1, 1)).transformed(translation=(x, 0, 0)) for x in (0, 0.2)
+    ]
+    rubber = ms.StableNeoHookean(young_modulus=1e6, poisson_ratio=0.3)
+    solids = [ms.Solid(mesh, material=rubber) for mesh in meshes]
+    held = ms.Pin(solids[0].mesh.vertices_at(x=0.0), body=solids[0])
+    for mesh, is_right in ((meshes[0], False), (solids[0].mesh, True)):
+        tie = ms.Tie(*solids, vertices=mesh.vertices_at(x=0.2))
+        plate = ms.RigidBody(mesh.vertices_at(x=0.2), body=solids[0])
+        for name, build in (
+            ("Tie", lambda tie=tie: ms.Scene(solids, supports=held, ties=tie)),
+            ("RigidBody", lambda plate=plate: ms.Scene([solids[0], plate], supports=held)),
+        ):
+            if is_right:
+                build()
+            else:
+                with pytest.raises(ValueError, match=f"{name} vertices hold the corners of 2 faces"):
+                    build()

@@ -127,3 +127,12 @@ def test_vertices_inside_of_a_magnet_are_warned_of():
         scene = ms.Scene(sheet, supports=ms.Pin(np.arange(sheet.mesh.n_vertices)), field=magnet)
         _, warned = result_and_warnings(lambda scene=scene: ms.equilibrium(scene, progress=False))
         assert any("vertices 0, 1, 2, 3, ... are inside of CuboidMagnet" in each for each in warned) == inside
+
+
+def test_flux_density_inside_of_a_solid_is_nan():
+    """Check that mu_0 H, which the charges give, is not returned as the flux density mu_0 (H + M) there."""
+    solid, sheet = cube(0.0), plate(SIDE)
+    state = ms.field_of(ms.equilibrium(held(solid, sheet), progress=False))
+    points = SIDE * np.array([[0.5, 0.5, 0.0], [0.5, 0.5, 0.499], [0.5, 0.5, 0.501], [1.1, 0.5, 0.0]])
+    for flux in (state.flux_density, state.own_flux_density):
+        assert np.isnan(flux(points)).all(axis=1).tolist() == [True, True, False, False]

@@ -161,3 +161,32 @@ def test_weight_of_curved_elements_has_exact_sum_and_moments():
     masses = 2.0 * np.linalg.det(slopes) * weight
     assert weights.sum() == pytest.approx(masses.sum(), rel=1e-12)
     assert np.allclose(weights @ mesh.rest_positions, np.einsum("tp,tpi->i", masses, at), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        lambda faces: ms.AreaLoad((1.0, 0, 0), faces),
+        lambda faces: ms.Pressure(1.0, faces=faces),
+        lambda faces: ms.ElasticFoundation(1e3, faces=faces),
+    ],
+)
+def test_faces_selected_on_the_mesh_of_four_node_tetrahedra_are_refused_on_a_quadratic_solid(load):
+    """Check that a load does not act elsewhere: faces of the given mesh have other numbers in that of the solid."""
+    mesh = ms.meshes.box((0.2, 0.1, 0.1), cells=(2, 1, 1))
+    solid = ms.Solid(mesh, material=ms.StableNeoHookean(young_modulus=1e6, poisson_ratio=0.3))
+    held = ms.Pin(solid.mesh.vertices_at(x=0.0))
+    selections = (
+        lambda mesh: mesh.faces_at(x=0.2),
+        lambda mesh: mesh.faces_where(lambda x: x[:, 0] > 0.19),
+        lambda mesh: mesh.faces_between(mesh.vertices_at(x=0.2)),
+        lambda mesh: mesh.faces_at(x=0.2)[::-1],
+    )
+    for select in selections:
+        with pytest.raises(
+            ValueError, match=r"has 20 faces, and the mesh of the body has 80: select on that"
+        ):
+            ms.Scene(solid, supports=held, loads=load(select(mesh)))
+        ms.Scene(solid, supports=held, loads=load(select(solid.mesh)))
+    linear = ms.Solid(mesh, material=solid.material, element="linear")
+    ms.Scene(linear, supports=ms.Pin(mesh.vertices_at(x=0.0)), loads=load(mesh.faces_at(x=0.2)))

@@ -1,8 +1,11 @@
 // RoundMotion: a ball, a capsule or an ellipsoid that a rigid body carries, and the obstacle next to it, at one state.
 //
-//   x(t) = sum a_k x_k,   a_k = 1/4 + w_k . (y + H t)        point of the shape's core (shape_core.h), at rest from the corners' mean
+//   x(t) = sum a_k x_k,   a_k = 1/4 + w_k . (y + H t)        point of the shape's core, at rest from the mean of the corners x_k
 //   g = min_t f(x(t)) + b |t|^2/2 - r                        gap, with the distance f of the obstacle
 //   p = x - r n                                              where they touch, on the surface of the shape
+//
+// shape_core.h has y, H, the radius r and the crown b; w_k are the gradients of the barycentric coordinates of the corners x_k, which move with
+// the rigid body.
 //
 // nearest_point.h finds t, with the directions d in which it moves, s = e . n + b t . d = 0 for e = dx/dt d, and the second derivatives S
 // in them. By the theorem of the envelope, the gap changes with the state as f does at constant t, and

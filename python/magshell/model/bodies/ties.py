@@ -11,6 +11,7 @@ from ..._input.quantity import quantity
 from ..._input.selections import indices, selection
 from ..._runtime.frozen import Frozen
 from ...mesh.connected import connected_groups
+from ...mesh.corners_alone import refuse_corners_alone
 from ...mesh.selection import RELATIVE_TOLERANCE
 from ..shells.shell import Shell
 from ..solids.solid import Solid
@@ -85,6 +86,7 @@ class Tie(Frozen):
         of_a = np.arange(self.a.mesh.n_vertices)
         if self.vertices is not None:
             of_a = indices("Tie vertices", self.vertices, self.a.mesh.n_vertices)
+            refuse_corners_alone("Tie", self.a.mesh, of_a)
         points, others = self.a.mesh.rest_positions[of_a], self.b.mesh.rest_positions
         apart, of_b = scipy.spatial.cKDTree(others).query(points, distance_upper_bound=np.inf)
         near = apart <= tolerance

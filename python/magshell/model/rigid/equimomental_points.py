@@ -13,6 +13,7 @@ import numpy as np
 
 from ..._input.selections import indices
 from ..._input.tensors import is_tensor
+from ...mesh.corners_alone import refuse_corners_alone
 from .rigid import RigidBody, or_zero
 from .skeleton import Skeleton
 
@@ -138,6 +139,7 @@ def _vertices(part: RigidBody, bodies) -> np.ndarray:
         )
     of = bodies.of(part)
     chosen = np.asarray(indices("RigidBody vertices", part.vertices, of.mesh.n_vertices))
+    refuse_corners_alone("RigidBody", of.mesh, chosen)
     if len(chosen) < 3:
         raise ValueError(
             f"a RigidBody needs 3 vertices at least, to tell how it is turned, got {len(chosen)}"

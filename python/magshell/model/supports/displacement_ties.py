@@ -11,9 +11,10 @@ import scipy
 from ..._input.quantity import quantity
 from ..._input.scalars import positive
 from ..._input.selections import count_of, indices, selection
+from ...mesh.corners_alone import refuse_corners_alone
 from ...mesh.selection import RELATIVE_TOLERANCE
 from ..bodies.bodies import checked_body, on_body
-from .supports import DirectedEdges, Held, RigidMove, Support, checked_components, refuse_corners_alone
+from .supports import DirectedEdges, Held, RigidMove, Support, checked_components
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers

@@ -15,6 +15,7 @@ from ...model.fields.field import UniformField
 from ...model.fields.magnet_forces import Action, action_between, magnetic_moment_of
 from ...model.results.result_lookup import OfOneBody
 from ...model.scene.own_field import own_field_inputs
+from ...model.scene.own_field_overlap import are_in_solids
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
@@ -62,7 +63,8 @@ class MagneticState(Frozen):
         self.equilibrium = equilibrium
 
     def flux_density(self, points: Numbers) -> np.ndarray:
-        """Return the flux density of the applied and the own field at points outside of the bodies, (n, 3) T.
+        """Return the flux density of the applied and the own field at points outside of the bodies, (n, 3) T; NaN inside of
+        a magnetized Solid with an own field.
 
         points: (n, 3) m. Only bodies of the scene's OwnField contribute to the own field. Within a few edge lengths of a
         shell the points of its sources show.
@@ -70,12 +72,15 @@ class MagneticState(Frozen):
         return self.applied_flux_density(points) + self.own_flux_density(points)
 
     def own_flux_density(self, points: Numbers) -> np.ndarray:
-        """Return the flux density of the magnetized bodies at points (n, 3) m outside of them, (n, 3) T; zero without an
-        OwnField. The magnetization that a field induces in susceptible shells makes none here.
+        """Return the flux density of the magnetized bodies at points (n, 3) m outside of them, (n, 3) T; NaN inside of a
+        magnetized Solid, zero without an OwnField. The magnetization that a field induces in susceptible shells makes none
+        here.
         """
         at, result = _points(points), self.equilibrium
         with result._values.in_core():
-            return result.scene._model.own_flux_density(result._state, at)
+            flux = result.scene._model.own_flux_density(result._state, at)
+        flux[are_in_solids(result.scene, np.asarray(detached(result.positions)), at)] = np.nan
+        return flux
 
     def applied_flux_density(self, points: Numbers) -> np.ndarray:
         """Return the flux density of the applied fields at points (n, 3) m, (n, 3) T; NaN where a field has no value."""
