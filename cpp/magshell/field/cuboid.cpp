@@ -3,6 +3,9 @@
 #include <cmath>
 #include <limits>
 
+#include "magshell/core/simd_angle.h"
+#include "magshell/core/simd_functions.h"
+
 namespace magshell {
 namespace {
 
@@ -16,21 +19,46 @@ namespace {
 // derivatives are those of the logarithms and of 1/r; F_xxx = -F_xyy - F_xzz, because F is harmonic.
 
 /// A function of the position relative to a line: its value, and its derivatives with respect to the coordinates (b, c)
-/// perpendicular to it.
+/// perpendicular to it. Number: double, or SimdDouble for several lines.
+template <class Number>
 struct LineFunction {
-    double value, b, c, bb, bc, cc;
+    Number value, b, c, bb, bc, cc;
+};
+
+/// The derivatives of F at a point relative to the corners of a cuboid, one corner in each lane.
+struct CornerDerivatives {
+    std::array<SimdDouble, 6> second;
+    std::array<SimdDouble, 10> third;
+    std::array<SimdDouble, 15> fourth;
+
+    CornerDerivatives() {
+        second.fill(0.0);
+        third.fill(0.0);
+        fourth.fill(0.0);
+    }
+
+    PotentialDerivatives of_lane(int lane, int order) const {
+        PotentialDerivatives out;
+        for (int n = 0; n < 6; ++n) out.second[n] = second[n][lane];
+        if (order >= 3)
+            for (int n = 0; n < 10; ++n) out.third[n] = third[n][lane];
+        if (order >= 4)
+            for (int n = 0; n < 15; ++n) out.fourth[n] = fourth[n][lane];
+        return out;
+    }
 };
 
 /// Returns t ln(r + |z|), at the distances x, y from the line.
-LineFunction end_of_line(double x, double y, double z, double r, double t) {
-    const double length = std::abs(z), sum = r + length;
+LineFunction<SimdDouble> end_of_line(const SimdDouble& x, const SimdDouble& y, const SimdDouble& z,
+                                     const SimdDouble& r, const SimdDouble& t) {
+    const SimdDouble length = abs(z), sum = r + length;
     // slope / rho; once and twice differentiated
-    const double g = t / (r * sum), h = -g * (2.0 * r + length) / (r * r * sum);
-    return {t * std::log(sum), x * g, y * g, g + x * x * h, x * y * h, g + y * y * h};
+    const SimdDouble g = t / (r * sum), h = -g * (2.0 * r + length) / (r * r * sum);
+    return {t * log(sum), x * g, y * g, g + x * x * h, x * y * h, g + y * y * h};
 }
 
 /// Returns ln(rho^2); NaN on the line.
-LineFunction whole_line(double x, double y) {
+LineFunction<double> whole_line(double x, double y) {
     const double square = x * x + y * y;
     if (square == 0.0) {
         constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -41,7 +69,8 @@ LineFunction whole_line(double x, double y) {
 }
 
 /// Adds F_bc = f and the derivatives that follow from it.
-void add_line(int b, int c, const LineFunction& f, int order, PotentialDerivatives& out) {
+template <class Number, class Derivatives>
+void add_line(int b, int c, const LineFunction<Number>& f, int order, Derivatives& out) {
     out.second[derivative_index(b, c)] += f.value;
     if (order < 3) return;
     out.third[derivative_index(b, b, c)] += f.b;
@@ -58,19 +87,40 @@ void add_line(int b, int c, const LineFunction& f, int order, PotentialDerivativ
 
 constexpr std::array<int, 3> next = {1, 2, 0}, after = {2, 0, 1};
 
-/// Returns the derivatives of F at x relative to a corner; side: the signs of x.
-PotentialDerivatives corner(const Vec3& x, const Vec3& side, int order) {
-    PotentialDerivatives out;
-    double r = x.norm();
-    if (r == 0.0) r = std::numeric_limits<double>::quiet_NaN();
+/// Returns atan2(t y z, |x| r), which is 0 where both vanish. Their squares add up to (x^2 + y^2) (x^2 + z^2).
+SimdDouble slant(const SimdDouble& x, const SimdDouble& y, const SimdDouble& z, const SimdDouble& r,
+                 const SimdDouble& t) {
+    const SimdDouble size = sqrt((x * x + y * y) * (x * x + z * z)), one(1.0);
+    const auto both_vanish = size.lanes == SimdDouble(0.0).lanes;
+    const SimdDouble inverse = one / SimdDouble(both_vanish ? one.lanes : size.lanes);
+    const SimdDouble cosine(both_vanish ? one.lanes : (abs(x) * r * inverse).lanes);
+    return angle_of(t * y * z * inverse, cosine);
+}
+
+/// Returns the derivatives of F at x relative to corners, NaN on a corner; side: the signs of x.
+CornerDerivatives corners(std::array<SimdDouble, 3> x, const std::array<SimdDouble, 3>& side, int order) {
+    CornerDerivatives out;
+    const SimdDouble square = x[0] * x[0] + x[1] * x[1] + x[2] * x[2], zero(0.0);
+    const SimdDouble nan(std::numeric_limits<double>::quiet_NaN());
+    const SimdDouble no_number(square.lanes == zero.lanes ? nan.lanes : zero.lanes);
+    const SimdDouble r = sqrt(square) + no_number;
+    for (SimdDouble& each : x) each += no_number;
     for (int a = 0; a < 3; ++a) {
         const int b = next[a], c = after[a];
-        out.second[derivative_index(a, a)] = -std::atan2(side[a] * x[b] * x[c], std::abs(x[a]) * r);
+        out.second[derivative_index(a, a)] = -slant(x[a], x[b], x[c], r, side[a]);
         add_line(b, c, end_of_line(x[b], x[c], x[a], r, side[a]), order, out);
         if (order >= 4) out.fourth[derivative_index(0, 1, 2, a)] = -x[a] / (r * r * r);
     }
     out.third[derivative_index(0, 1, 2)] = 1.0 / r;
     return out;
+}
+
+/// Returns the lanes that hold upper corners along an axis, if the first lane holds corner `first`: bit `axis` of a corner's number
+/// is set for an upper one.
+auto upper_lanes(int first, int axis) {
+    unsigned bits = 0;
+    for (int lane = 0; lane < SimdDouble::width; ++lane) bits |= (((first + lane) >> axis) & 1u) << lane;
+    return lanes_with_bits(bits);
 }
 
 }  // namespace
@@ -93,11 +143,19 @@ void Cuboid::for_each_piece(const Vec3& y, int order, const Add& add) const {
     std::array<Vec3, 2> signs;
     for (int a = 0; a < 3; ++a)
         for (int s = 0; s < 2; ++s) signs[s][a] = outward_sign(from[s][a], 2 * s - 1);
-    for (int n = 0; n < 8; ++n) {
-        const std::array<int, 3> s = {n & 1, (n >> 1) & 1, n >> 2};
-        const Vec3 x(from[s[0]][0], from[s[1]][1], from[s[2]][2]);
-        const Vec3 sides(2 * s[0] - 1, 2 * s[1] - 1, 2 * s[2] - 1);
-        add(-sides.prod(), sides, corner(x, {signs[s[0]][0], signs[s[1]][1], signs[s[2]][2]}, order));
+    for (int first = 0; first < 8; first += SimdDouble::width) {
+        std::array<SimdDouble, 3> x, side;
+        for (int a = 0; a < 3; ++a) {
+            const auto upper = upper_lanes(first, a);
+            x[a] = SimdDouble(upper ? SimdDouble(from[1][a]).lanes : SimdDouble(from[0][a]).lanes);
+            side[a] = SimdDouble(upper ? SimdDouble(signs[1][a]).lanes : SimdDouble(signs[0][a]).lanes);
+        }
+        const CornerDerivatives found = corners(x, side, order);
+        for (int lane = 0; lane < SimdDouble::width; ++lane) {
+            const int n = first + lane;
+            const Vec3 sides(2 * (n & 1) - 1, 2 * ((n >> 1) & 1) - 1, 2 * (n >> 2) - 1);
+            add(-sides.prod(), sides, found.of_lane(lane, order));
+        }
     }
     for (int a = 0; a < 3; ++a) {
         if (signs[0][a] == signs[1][a]) continue;
