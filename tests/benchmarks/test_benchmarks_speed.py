@@ -1,7 +1,6 @@
 """Tests of the benchmark parts that measure speed: their output and files for tiny sheets, never their times."""
 
 import json
-import time
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 from bench_figures import is_a_picture
 
 import magshell as ms
-from benchmarks import timing
 from benchmarks.__main__ import main
 from benchmarks.busy_machine import COMPANY
 from benchmarks.core_limits import CORES, front_span, front_work, limits, makespan
@@ -147,36 +145,6 @@ def test_scaling_without_the_memory_for_it(monkeypatch, tmp_path, capsys) -> Non
 def test_exponents_of_power_laws() -> None:
     assert fitted_exponent([10, 100, 1000], [3.0, 30.0 * 10**0.5, 3000.0]) == pytest.approx(1.5)
     assert fitted_exponent([10, 10], [1.0, 2.0]) is None and fitted_exponent([1, 2], [1.0, None]) is None
-
-
-@pytest.mark.alone
-@pytest.mark.parametrize("long", [True, False])
-def test_a_long_call_is_measured_in_one_round(monkeypatch, long: bool) -> None:
-    calls = []
-    monkeypatch.setattr(timing, "LONG", -1.0 if long else 1e9)
-    measured = timing.clocked(lambda: calls.append(time.sleep(2e-3)), rounds=2, seconds=6e-3)
-    assert 1 < len(calls) <= 1 + (1 if long else 2) * 3
-    assert measured.wall >= 2e-3 and 0 <= measured.processor < measured.wall
-
-
-@pytest.mark.alone
-def test_share_of_the_processor() -> None:
-    ms.set_num_threads(1)
-    slept, share = timing.with_processor_fraction(lambda: time.sleep(0.05))
-    assert slept is None and share < 0.5
-    assert timing.with_processor_fraction(lambda: None)[1] == 1.0
-    ms.set_num_threads(2)
-    assert timing.with_processor_fraction(lambda: time.sleep(0.01))[1] == 1.0
-
-
-def test_solves_measure_the_processor_if_told_to():
-    walls = time.perf_counter
-    for threads, clock in ((1, time.process_time), (2, walls)):
-        ms.set_num_threads(threads)
-        with pytest.raises(RuntimeError, match="stopped"), timing.processor_clock():
-            assert time.perf_counter is clock
-            raise RuntimeError("stopped")
-        assert time.perf_counter is walls
 
 
 def test_terms_part_prints_and_writes(tmp_path, capsys) -> None:

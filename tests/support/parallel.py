@@ -2,6 +2,7 @@
 tests run while all others wait.
 
 A test that measures time, or counts threads, is marked `alone`. While it runs, the other processes wait between two tests.
+It waits for the tests that run, so files with such tests come after those with long tests.
 Tests that took long when they were last measured (tests/seconds.txt, written by `make seconds`) are marked `slow`;
 `make quick` leaves them out. They are measured in time of the processor, which depends little on what else it does. A
 fixture that the tests of a file share counts for each of them, as the first one that runs has to build it.
@@ -58,12 +59,14 @@ def measured() -> dict[str, float]:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark slow tests, and sort files for several processes: those that take longest come first, so that all end
-    together.
+    together, and those with tests that run alone between them and the quick ones.
     """
     seconds = measured()
     of_file: dict[Path, float] = defaultdict(float)
-    seen = set()
+    seen, with_alone = set(), set()
     for item in items:
+        if item.get_closest_marker("alone") is not None:
+            with_alone.add(item.path)
         name = name_of(item)
         if name in seconds:
             item.add_marker(pytest.mark.slow)
@@ -71,6 +74,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             of_file[item.path] += seconds.get(name, 0.0)
         seen.add(name)
     if PROCESSES > 1:
+        least = 0.5 * min(seconds.values(), default=0.0)
+        of_file |= dict.fromkeys(with_alone, least)
         items.sort(
             key=lambda item: -of_file[item.path]
         )  # stable: within a file, and among quick ones, as they were
