@@ -1,11 +1,12 @@
 """Kinds of scene with numbers of their stiffness, for gradient_kinds.py: frequencies, buckling factors, critical points."""
 
+import warnings
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from adjoint_scenes import DEFAULTS, MESH, everything
-from gradient_kinds_own_field import stiff_pair, stiff_pair_magnetization
+from gradient_kinds_own_field import closing_flaps, stiff_pair, stiff_pair_magnetization
 from gradient_scenes import Kind
 from gradient_world import EXACT, FACTORS, REACH
 
@@ -190,6 +191,40 @@ def snap(scene, values, start=None, solver=None, **given):
     return found
 
 
+def snap_together(scene, values, start=None, **given):
+    """Return the limit point of the path on which a field presses two flaps together that attract each other."""
+    field = as_tensor(given.pop("applied_flux_density"))  # a tensor: the point is located by Newton's method
+    rest = ms.equilibrium(scene, values=values, applied_flux_density=0.0 * field, **given)
+    upper = len(scene.mesh.rest_positions) // 2
+    # The path ends beyond its limit point, where the flaps are too near each other for their meshes.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ms.FieldSamplingWarning)
+        path = ms.follow_path(
+            rest.scene,
+            values={owner: named for owner, named in values.items() if owner is not scene},
+            applied_flux_density=field,
+            start=rest,
+            first_step=0.03,
+            max_step=0.02,
+            until=lambda _, at: np.min(at[upper:, 2] - at[:upper, 2]) < 1.3e-3,
+            progress=False,
+            **given,
+        )
+    point = next(each for each in path.critical if each.kind == "limit")
+    found = numbers(point.parameter)
+    found.displacements = as_tensor(point.positions) - torch.tensor(np.array(scene.mesh.rest_positions))
+    return found
+
+
+def snapping_flaps() -> Kind:
+    """Build two flaps that snap together in a field."""
+    scene = closing_flaps()
+    n = scene.bodies[0].mesh.n_faces
+    magnetization = np.repeat([[2.4e4, 1e3, 0.0], [-2.6e4, 1e3, 0.0]], n, axis=0)
+    inputs = {"remanent_magnetization": magnetization, "applied_flux_density": (1e-4, -2e-4, 2e-2)}
+    return Kind(scene, inputs, solve=snap_together, fixed=EXACT, reach=REACH, of_linear=True)
+
+
 OF_SHEET = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
 
 
@@ -231,6 +266,7 @@ def buckling_with_own_field() -> Kind:
 LINEAR_MAKERS = {
     "flaps with their own field that buckle": buckling_with_own_field,
     "flaps with their own field that vibrate": vibrating_with_own_field,
+    "flaps with their own field that snap together": snapping_flaps,
     "a sheet that vibrates about an equilibrium": vibrating_sheet,
     "a solid that vibrates about an equilibrium": vibrating_solid,
     "a sheet that vibrates about its rest shape": vibrating_at_rest,

@@ -146,3 +146,18 @@ def stiff_pair(tip_load=(0.0, 0.0, 0.0), cells=(3, 1), law="stretches") -> ms.Sc
 
 def stiff_pair_magnetization(scene) -> np.ndarray:
     return 4e4 * np.random.default_rng(4).uniform(0.5, 1.5, (scene.mesh.n_faces, 3)) * (1.0, 0.5, 1.0)
+
+
+def closing_flaps() -> ms.Scene:
+    """Build two clamped flaps above each other that attract, of different stiffness, so that one limit point is simple."""
+    mesh = ms.meshes.rectangle(0.02, 0.006, cells=(2, 1))
+    meshes = [mesh, mesh.transformed(translation=(2e-4, 1e-4, 3e-3))]
+    flaps = [
+        ms.Shell(each, thickness=4e-4, young_modulus=modulus, poisson_ratio=0.3, mass_density=2e3)
+        for each, modulus in zip(meshes, (1.5e7, 1.7e7), strict=True)
+    ]
+    supports = [
+        ms.Clamp(each.edges_at(x=each.rest_positions[:, 0].min()), body=flap)
+        for each, flap in zip(meshes, flaps, strict=True)
+    ]
+    return ms.Scene(flaps, supports=supports, own_field=ms.OwnField(), field=ms.UniformField())
