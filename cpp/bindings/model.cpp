@@ -447,14 +447,17 @@ void register_model(py::module_& module) {
                     found = own_field->gap_forces(q.data());
                 }
                 return std::tuple(owners, rows_from(found.taken), rows_from(found.finer), found.sizes,
-                                  found.nearest);
+                                  found.nearest, found.taken_within, found.finer_within,
+                                  found.nearest_within);
             },
             py::arg("q"),
             "Of each body of the own field: its owner, the force [N] of others on it between near elements, "
             "as the "
             "energy has it and at more points, (n, 3) each, the sum of the sizes of the latter on its "
             "elements [N], and "
-            "the distance of the nearest points [m].")
+            "the distance of the nearest points [m]. Of its own elements that are near now but not at rest: "
+            "the "
+            "sums of the sizes of their forces, both ways, and the distance.")
         .def(
             "low_rank",
             [](Model& model, bool reduced) {

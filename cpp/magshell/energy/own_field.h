@@ -138,12 +138,16 @@ class OwnField {
     };
     DipoleActions on_dipoles(const double* q) const;
     /// The forces [N] on each body by elements of others that are near, as the energy has them and at more points; the sum of the sizes of
-    /// the latter on its elements [N], and the distance of the nearest points [m].
+    /// the latter on its elements [N], and the distance of the nearest points [m]. The same of its own elements that are near now but not
+    /// at rest: the sums of the sizes of their forces, and the distance.
     struct GapForces {
         std::vector<Vec3> taken, finer;
         std::vector<double> sizes, nearest;
+        std::vector<double> taken_within, finer_within, nearest_within;
     };
-    GapForces gap_forces(const double* q, const Neighbours& near, const std::vector<Index>& body_of_face,
+    /// rest: positions of the nodes at rest, as q.
+    GapForces gap_forces(const double* q, const double* rest, const Neighbours& near,
+                         const std::vector<Index>& body_of_face,
                          const std::vector<Index>& body_of_tetrahedron, Index n_bodies) const;
     /// Returns the flux density [T] at points outside of the bodies.
     std::vector<Vec3> flux_density(const double* q, const std::vector<Vec3>& points) const;

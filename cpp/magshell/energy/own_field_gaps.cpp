@@ -88,16 +88,16 @@ Vec3 sum_of_pulls(const Points& first, const Points& second, double& nearest) {
 
 // The force on an element by another is mu_0/(4 pi) (Q Q' - I I' L . L') sum w_i w_j (p_i - p_j)/r^3, as in energy/own_field_near_pairs.cpp, and
 // that on a charge by the sides of a face mu_0/(4 pi) Q I_f times the field of a current of 1 around it, as in energy/own_field_sides.cpp.
-OwnField::GapForces OwnField::gap_forces(const double* q, const Neighbours& near,
+OwnField::GapForces OwnField::gap_forces(const double* q, const double* rest, const Neighbours& near,
                                          const std::vector<Index>& body_of_face,
                                          const std::vector<Index>& body_of_tetrahedron,
                                          Index n_bodies) const {
-    GapForces found{std::vector<Vec3>(n_bodies, Vec3::Zero()), std::vector<Vec3>(n_bodies, Vec3::Zero()),
-                    std::vector<double>(n_bodies, 0.0),
-                    std::vector<double>(n_bodies, std::numeric_limits<double>::infinity())};
-    if (n_bodies < 2) return found;
-    const std::vector<Triple<double>> x = positions<double>(q, nullptr);
-    const Geometry<double> at(*this, x);
+    const std::vector<double> none(n_bodies, 0.0), far(n_bodies, std::numeric_limits<double>::infinity());
+    const std::vector<Vec3> no_forces(n_bodies, Vec3::Zero());
+    GapForces found{no_forces, no_forces, none, far, none, none, far};
+    const std::vector<Triple<double>> x = positions<double>(q, nullptr),
+                                      at_rest = positions<double>(rest, nullptr);
+    const Geometry<double> at(*this, x), before(*this, at_rest);
     const auto body_of = [&](const Element& element) {
         return (element.is_edge() ? body_of_face : body_of_tetrahedron)[element.bodies[0]];
     };
@@ -168,7 +168,7 @@ OwnField::GapForces OwnField::gap_forces(const double* q, const Neighbours& near
         }
         return sum;
     };
-    // The force on a source by another of another body. A face comes after all elements.
+    // The force on a source by another, of another body or of the same. A face comes after all elements.
     struct Push {
         std::array<Index, 2> sources, bodies;
         double nearest;
@@ -179,15 +179,21 @@ OwnField::GapForces OwnField::gap_forces(const double* q, const Neighbours& near
     for (const std::array<Index, 2>& each : near.elements) {
         const Index first = element_order_[each[0]], second = element_order_[each[1]];
         const Element &a = elements_[first], &b = elements_[second];
-        const double apart = values_of(at.middle(a) - at.middle(b)).norm();
-        if (body_of(a) != body_of(b) && apart < of_elements.near * std::max(a.length, b.length))
+        const double apart = values_of(at.middle(a) - at.middle(b)).norm(),
+                     longer = std::max(a.length, b.length);
+        const double distance = values_of(before.middle(a) - before.middle(b)).norm();
+        const bool were_near = body_of(a) == body_of(b) && distance < of_elements.far * longer;
+        if (!were_near && apart < of_elements.near * longer)
             pushes.push_back({{first, second}, {body_of(a), body_of(b)}, apart});
     }
     for (const std::array<Index, 2>& each : near.sides) {
         const Index e = element_order_[each[0]], f = face_order_[each[1]];
         const Element& element = elements_[e];
         const double apart = values_of(at.middle(element) - at.center(faces_[f])).norm();
-        if (body_of(element) != body_of_face[f] && apart < std::max(element.length, faces_[f].size))
+        const double distance = values_of(before.middle(element) - before.center(faces_[f])).norm();
+        const double longer = std::max(element.length, faces_[f].size);
+        const bool were_near = body_of(element) == body_of_face[f] && distance < of_elements.far * longer;
+        if (!were_near && apart < longer)
             pushes.push_back({{e, n_elements + f}, {body_of(element), body_of_face[f]}, apart});
     }
     in_blocks(static_cast<Index>(pushes.size()), [&](Index begin, Index end) {
@@ -216,7 +222,15 @@ OwnField::GapForces OwnField::gap_forces(const double* q, const Neighbours& near
     });
     std::vector<Vec3> on_sources(elements_.size() + faces_.size(), Vec3::Zero());
     std::vector<Index> bodies(on_sources.size(), 0);
-    for (const Push& push : pushes)
+    for (const Push& push : pushes) {
+        if (push.bodies[0] == push.bodies[1]) {
+            const Index body = push.bodies[0];
+            const double size = push.finer.norm();
+            found.finer_within[body] += size;
+            found.taken_within[body] += size > 0.0 ? push.taken.dot(push.finer) / size : 0.0;
+            found.nearest_within[body] = std::min(found.nearest_within[body], push.nearest);
+            continue;
+        }
         for (int side = 0; side < 2; ++side) {
             const double sign = side == 0 ? 1.0 : -1.0;
             const Index body = push.bodies[side], source = push.sources[side];
@@ -226,6 +240,7 @@ OwnField::GapForces OwnField::gap_forces(const double* q, const Neighbours& near
             on_sources[source] += sign * push.finer;
             bodies[source] = body;
         }
+    }
     for (std::size_t k = 0; k < on_sources.size(); ++k) found.sizes[bodies[k]] += on_sources[k].norm();
     return found;
 }

@@ -8,6 +8,8 @@ import pytest
 from magnet_forces import VACUUM_PERMEABILITY, cuboid_force
 
 import magshell as ms
+from magshell.model.scene.own_field_errors import gap_errors, warn_of_gaps
+from magshell.model.scene.solve_inputs import plain_inputs
 
 SIDE, THICKNESS, POLARIZATION = 0.01, 2e-4, 0.1
 MAGNETIZATION = (0.0, 0.0, POLARIZATION / VACUUM_PERMEABILITY)
@@ -74,6 +76,33 @@ def test_near_bodies_are_warned_of_where_their_force_is_off(first, second, sizes
     if warned:
         named = float(re.search(r"is off by about ([\d.]+)%", warned[0]).group(1)) / 100
         assert named == pytest.approx(error, rel=0.4)
+
+
+@pytest.mark.parametrize(("gap", "is_wrong"), [(0.1 * THICKNESS, True), (3 * THICKNESS, False)])
+def test_parts_of_a_folded_sheet_are_warned_of_like_two_plates(gap, is_wrong):
+    """Check a sheet that is folded flat, so that its outer parts are two plates that lie on each other."""
+    mesh = ms.meshes.rectangle(2.2 * SIDE, SIDE, cells=(22, 10))
+    x = mesh.rest_positions
+    folded = x.copy()
+    right = x[:, 0] > 1.1 * SIDE
+    folded[right, 0] = 2.2 * SIDE - x[right, 0]
+    folded[:, 2] = (gap + THICKNESS) * np.clip((x[:, 0] - SIDE) / (0.2 * SIDE), 0.0, 1.0)
+    # Only the outer parts have a magnetization: those that lie on each other.
+    centers = x[mesh.faces].mean(axis=1)[:, 0]
+    outer = (centers < SIDE) | (centers > 1.2 * SIDE)
+    magnetization = (
+        np.where(outer[:, None], [[0.0, 0.0, 1.0]], 0.0) * np.where(centers < SIDE, 1.0, -1.0)[:, None]
+    )
+    magnetization *= MAGNETIZATION[2]
+    sheet = ms.Shell(mesh, thickness=THICKNESS, young_modulus=1e9, remanent_magnetization=magnetization)
+    scene = held(sheet)
+    values = plain_inputs(scene, None, None, None).values
+    state = scene._model.state(folded, np.zeros(scene._bodies.n_rotations))
+    (found,) = gap_errors(values, state)
+    assert found.is_within and found.gap < 2 * (gap + THICKNESS)
+    assert (found.error > 0.05) == is_wrong and (is_wrong or found.error < 5e-3)
+    _, warned = result_and_warnings(lambda: warn_of_gaps([found], "this state"))
+    assert bool(warned) == is_wrong and all("between parts of Shell(" in each for each in warned)
 
 
 def flaps(gap):

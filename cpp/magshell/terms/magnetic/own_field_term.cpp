@@ -185,7 +185,17 @@ OwnField::GapForces OwnFieldTerm::gap_forces(const double* q) const {
     for (const SheetTriangles& sheet : sheets_) of_faces.insert(of_faces.end(), sheet.n_triangles(), body++);
     for (const MagnetizedSolid& each : solids_)
         of_tetrahedra.insert(of_tetrahedra.end(), each.solid->n_elements(), body++);
-    return field_.gap_forces(q, state_at(q)->near, of_faces, of_tetrahedra, body);
+    VectorXd rest = VectorXd::Zero(n_dofs_);
+    const auto set = [&](const std::vector<std::array<Index, 3>>& nodes,
+                         const std::vector<std::array<Vec3, 3>>& corners) {
+        for (std::size_t k = 0; k < nodes.size(); ++k)
+            for (int i = 0; i < 3; ++i) rest.segment<3>(3 * nodes[k][i]) = corners[k][i];
+    };
+    const OwnField::Faces faces = triangles_of(sheets_);
+    const OwnField::Triangles triangles = triangles_of(solids_);
+    set(faces.nodes, faces.rest);
+    set(triangles.nodes, triangles.rest);
+    return field_.gap_forces(q, rest.data(), state_at(q)->near, of_faces, of_tetrahedra, body);
 }
 
 std::vector<std::string> OwnFieldTerm::owners() const {

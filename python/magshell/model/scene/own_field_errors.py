@@ -6,7 +6,8 @@ other,
 
     error = |sum F - sum F_finer| / max(|force of the own field on the body|, sum |F_finer| / 10),
 
-for each body, by all near elements of the others. Elements of one body are not compared, nor are moments of rigid bodies.
+for each body, by all near elements of the others. The parts of one body, as of a folded strip, are compared where their
+elements are near now but not at rest: the error is that of the sum of |F|. Moments of rigid bodies are not compared.
 """
 
 from __future__ import annotations
@@ -28,12 +29,13 @@ _COINCIDE = 1e-9  # [-] distance of two points, over the extent, below which the
 class GapError(NamedTuple):
     """The relative error of the force on a body by others in its own field, and its distance from them [m].
 
-    error: infinite where points of two bodies coincide.
+    error: infinite where points of two bodies coincide. is_within: whether it is of the forces between parts of the body.
     """
 
     body: Any
     error: float
     gap: float
+    is_within: bool
 
 
 def gap_errors(values: Values, state: np.ndarray) -> Iterator[GapError]:
@@ -42,24 +44,34 @@ def gap_errors(values: Values, state: np.ndarray) -> Iterator[GapError]:
     if scene.own_field is None or not np.isfinite(state).all():
         return
     with values.in_core():
-        owners, taken, finer, sizes, gaps = scene._model.own_field_gap_forces(state)
-        if not np.isfinite(gaps).any():
+        owners, *arrays = scene._model.own_field_gap_forces(state)
+        taken, finer, sizes, gaps, taken_within, finer_within, gaps_within = arrays
+        if not np.isfinite([*gaps, *gaps_within]).any():
             return
         layout = scene._load_parameter_layout
         factor = layout.packed({("scene", "own_field_factor"): np.ones(1)}, layout.zeros())
         forces = -scene._model.positions(scene._model.term_gradient("own field", state, factor))
     objects = {label: each for each, label in scene._labels}
-    for owner, force, better, size, gap in zip(owners, taken, finer, sizes, gaps, strict=True):
-        if not np.isfinite(gap):
-            continue
+    for k, owner in enumerate(owners):
         body = objects[owner]
-        number = next(
-            k for k, each in enumerate(scene.bodies) if each is body or getattr(each, "skin", None) is body
-        )
-        total = np.linalg.norm(forces[scene._bodies.spans[number].vertices].sum(axis=0))
-        reference = max(float(total), CANCELLING * size)
-        error = float(np.linalg.norm(force - better)) / reference if reference > 0.0 else 0.0
-        yield GapError(body, error if np.isfinite(error) else np.inf, float(gap))
+        if np.isfinite(gaps[k]):
+            number = next(
+                n
+                for n, each in enumerate(scene.bodies)
+                if each is body or getattr(each, "skin", None) is body
+            )
+            total = np.linalg.norm(forces[scene._bodies.spans[number].vertices].sum(axis=0))
+            reference = max(float(total), CANCELLING * sizes[k])
+            yield GapError(body, _ratio(np.linalg.norm(taken[k] - finer[k]), reference), gaps[k], False)
+        if np.isfinite(gaps_within[k]):
+            off = abs(taken_within[k] - finer_within[k])
+            yield GapError(body, _ratio(off, finer_within[k]), gaps_within[k], True)
+
+
+def _ratio(off: Any, reference: float) -> float:
+    """Return an error over its reference, infinite where it is not a number, 0 where nothing acts."""
+    error = float(off) / reference if reference > 0.0 else 0.0
+    return error if np.isfinite(error) else np.inf
 
 
 def describe_coincident_points(values: Values, state: np.ndarray) -> str:
@@ -68,7 +80,7 @@ def describe_coincident_points(values: Values, state: np.ndarray) -> str:
     if scene.own_field is None or not np.isfinite(state).all():
         return ""
     with values.in_core():
-        gaps = scene._model.own_field_gap_forces(state)[-1]
+        gaps = scene._model.own_field_gap_forces(state)[4]
     if not min(gaps, default=np.inf) < _COINCIDE * scene._bodies.extent:
         return ""
     return (
@@ -83,8 +95,11 @@ def warn_of_gaps(found: Iterable[GapError], where: str) -> None:
     if worst is None or not worst.error > TRUSTED:
         return
     by = f"by about {worst.error:.0%}" if worst.error < 1.0 else "entirely"
+    what, other = "force of the own field on", "another body"
+    if worst.is_within:
+        what, other = "forces of the own field between parts of", "one of them"
     warn_of_forces(
-        f"{where}: the force of the own field on {worst.body!r} is off {by}, as another body is about {worst.gap:.2g} m "
-        "away, much less than its edges are long, or passes through it. Take a finer mesh there, with edges of at most four "
-        "times the gap, or keep the bodies apart by a Contact"
+        f"{where}: the {what} {worst.body!r} {'are' if worst.is_within else 'is'} off {by}, as {other} is about "
+        f"{worst.gap:.2g} m away, much less than its edges are long, or passes through it. Take a finer mesh there, with "
+        "edges of at most four times the gap, or keep them apart by a contact"
     )
