@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
+from magshell import _core
 from magshell.solve.adjoint.factorized import stiffness_parts
 from magshell.solve.linear.stiffness import symmetric
 
@@ -95,6 +96,23 @@ def test_many_products_make_an_operator_dense(rest):
     assert not np.array_equal(products[0], products[-1])  # in another order
     size = np.abs(products[0]).max()
     np.testing.assert_allclose(products[-1], products[0], rtol=0.0, atol=1e-12 * size)
+
+
+def test_bytes_of_a_factor_contain_the_vectors_of_its_count_and_the_dense_operator(rest):
+    with rest._values.in_core():
+        parts = stiffness_parts(SCENE._model, rest._state, rest._load_parameters)
+        size, starts, rows, values = parts.triangle
+        factor = _core.analyze(size, starts, rows)
+        factor.factorize(values)
+        without = factor.bytes
+        factor.factorize(values, operators=parts.operators)
+        counted = factor.bytes
+        assert counted - without >= 8 * (
+            len(values) + 2 * 6 * size
+        )  # a copy of the entries, 6 steps at least
+        for _ in range(size):
+            factor.solve(np.ones(size))
+        assert factor.bytes - counted == 8 * size**2
 
 
 def test_a_strip_branches_where_linear_theory_says_it_buckles(buckling_load):

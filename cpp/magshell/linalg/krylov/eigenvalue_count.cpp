@@ -97,6 +97,7 @@ EigenvalueCount count_below(const std::function<void(VectorXd&)>& solve, const V
         }
         beside.push_back(length);
     }
+    count.bytes = 2 * vectors.size() * static_cast<std::size_t>(n) * sizeof(double);
     return count;
 }
 

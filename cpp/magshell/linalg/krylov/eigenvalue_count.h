@@ -2,6 +2,7 @@
 // its products.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 
 #include "magshell/core/types.h"
@@ -14,6 +15,7 @@ struct EigenvalueCount {
     bool settled = false;  // whether the next one is known to lie above it
     double margin =
         0.0;  // [-] distance of the nearest one from the bound, over the size of the largest one, or over 1
+    std::size_t bytes = 0;         // of the vectors that the count took
     Eigen::MatrixXd directions{};  // (n, below) approximations of their eigenvectors, if they are wanted
 };
 

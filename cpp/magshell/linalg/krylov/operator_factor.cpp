@@ -80,6 +80,7 @@ FactorReport OperatorFactor::complete_report() {
                 solves_with(*positive), diagonal,
                 [&](const VectorXd& x) { return VectorXd(operator_(x) - shift.cwiseProduct(x)); }, -1.0);
     }
+    count_bytes_ = std::max(count_bytes_, count.bytes);
     // Without a settled count K may be indefinite, so it is not called stable.
     report_.negative_pivots = count.settled ? count.below : std::max<Index>(count.below, 1);
     report_.perturbed_pivots = count.settled ? 0 : 1;

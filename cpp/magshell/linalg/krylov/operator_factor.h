@@ -42,10 +42,14 @@ class OperatorFactor final : public Factor {
     std::string name() const override { return sparse_->name(); }
     std::int64_t nonzeros() const override { return sparse_->nonzeros(); }
     double flops() const override { return sparse_->flops(); }
-    std::size_t bytes() const override { return sparse_->bytes(); }
-    std::size_t own_bytes() const override { return sparse_->own_bytes(); }
+    std::size_t bytes() const override { return sparse_->bytes() + bytes_of_operator(); }
+    std::size_t own_bytes() const override { return sparse_->own_bytes() + bytes_of_operator(); }
 
   private:
+    /// Returns the memory of the entries of A, of the matrix of H if there is one, and of the vectors of the largest count.
+    std::size_t bytes_of_operator() const {
+        return entries_.size() * sizeof(double) + operator_.bytes() + count_bytes_;
+    }
     /// Returns a positive definite factorization of A plus a multiple of its diagonal; nullptr if there is none. values: of A. shift: set
     /// to that multiple of the diagonal.
     std::unique_ptr<Factor> shifted(const LargeVector<double>& values, VectorXd& shift) const;
@@ -54,6 +58,7 @@ class OperatorFactor final : public Factor {
     RepeatedOperator operator_;
     Operator rough_;
     LargeVector<double> entries_;  // of A, which a factorization overwrites
+    std::size_t count_bytes_ = 0;
     bool deferred_ = false, counted_ = true;
 };
 

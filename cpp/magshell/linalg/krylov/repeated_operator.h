@@ -3,6 +3,7 @@
 // The matrix sums in another order: later products differ from earlier ones by round-off.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -26,6 +27,12 @@ class RepeatedOperator {
     bool is_dense() const {
         const std::lock_guard lock(state_->changes);
         return state_->matrix.size() > 0;
+    }
+    /// Returns the memory of the matrix, if there is one.
+    std::size_t bytes() const {
+        if (!state_) return 0;
+        const std::lock_guard lock(state_->changes);
+        return static_cast<std::size_t>(state_->matrix.size()) * sizeof(double);
     }
     VectorXd operator()(const VectorXd& x) const {
         // Columns up to which a matrix is made; it takes 72 MB then. See test_many_products_make_an_operator_dense.
