@@ -34,7 +34,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from _identify.inverse import Problem, lbfgs, mma, optimized
+from _identify.inverse import Problem, lbfgs, mma, optimized, whitened
 from _identify.limits import deviations, intervals, of_finer_magnetizations, scaled_together
 from _identify.model import NOISE, measured, sheet, true_magnetization
 from _identify.report import draw_history, draw_magnetization, draw_modulus, summary
@@ -49,33 +49,35 @@ def main(cells=(30, 18), nodes=(11, 7), prices=PRICES, iterations=40, limits_on=
     """Return the figure's numbers, in SI units."""
     torch.set_num_threads(1)
     noisy = identified(cells, nodes, prices, iterations, NOISE)
-    chosen = noisy["stages"][noisy["chosen"]]
+    first, chosen = noisy["stages"][0], noisy["stages"][noisy["chosen"]]
     problem = noisy["problem"]
-    before = noisy["stages"][max(noisy["chosen"] - 1, 0)]["p"]
+    searched = problem, chosen["start"], chosen["basis"], chosen["price"]
     return {
         "cells": cells,
         "faces": problem.sheet.mesh.n_faces,
         "unknowns": len(chosen["p"]),
         "noisy": noisy,
-        "exact": identified(cells, nodes, prices, iterations, 0.0),
-        "same mesh": identified(cells, nodes, prices, iterations, NOISE, same_mesh=True),
+        "exact": identified(cells, nodes, prices, iterations, 0.0, first["basis"]),
+        "same mesh": identified(cells, nodes, prices, iterations, NOISE, first["basis"], same_mesh=True),
         "deviations": deviations(problem, chosen["p"]),
-        "compared": [
-            {"name": name, **optimized(problem, before, chosen["price"], optimizer, iterations)}
-            for name, optimizer in (("L-BFGS", lbfgs), ("MMA", mma))
-        ],
+        "compared": [{"name": "L-BFGS", **chosen}, {"name": "MMA", **optimized(*searched, mma, iterations)}],
         "intervals": intervals(limits_on),
         "scaled together": scaled_together(limits_on),
         "finer magnetizations": of_finer_magnetizations(limits_on),
     }
 
 
-def identified(cells, nodes, prices, iterations, noise, same_mesh=False) -> dict:
-    """Lower and lower prices, each from the last one's result, until the misfit is the noise's; exact data, all."""
+def identified(cells, nodes, prices, iterations, noise, basis=None, same_mesh=False) -> dict:
+    """Lower and lower prices, each from the last one's result, until the misfit is the noise's; exact data, all.
+
+    basis: of the variables of the first search, if it is known; it depends on the guess, but not on the data.
+    """
     problem = Problem(sheet(cells), measured(cells, noise, same_mesh), NOISE, nodes)
     p, stages = problem.guess(), []
     for price in prices:
-        stage = optimized(problem, p, price, lbfgs, iterations)
+        if stages or basis is None:
+            basis = whitened(problem.sensitivity(p))
+        stage = optimized(problem, p, basis, price, lbfgs, iterations)
         p = stage["p"]
         stages.append({**stage, **errors(problem, p)})
         if noise > 0 and stage["misfits"][-1] <= 1.0:

@@ -82,9 +82,10 @@ def whitened(sensitivity: np.ndarray, floor: float = FLOOR) -> torch.Tensor:
     return torch.from_numpy(vectors / np.sqrt(values))
 
 
-def optimized(problem: Problem, p: torch.Tensor, price: float, optimizer, iterations: int) -> dict:
-    """Minimize misfit + price x variation, starting from p."""
-    basis = whitened(problem.sensitivity(p))
+def optimized(
+    problem: Problem, p: torch.Tensor, basis: torch.Tensor, price: float, optimizer, iterations: int
+) -> dict:
+    """Minimize misfit + price x variation, starting from p, in the variables u of p + basis u."""
     u = torch.zeros(len(p), dtype=torch.float64, requires_grad=True)
 
     def objective(u):
@@ -95,6 +96,8 @@ def optimized(problem: Problem, p: torch.Tensor, price: float, optimizer, iterat
         objective, [u], optimizer([u]), max_iterations=iterations, tolerance=1e-4, progress=False
     )
     return {
+        "start": p,
+        "basis": basis,
         "p": (p + basis @ u).detach(),
         "price": price,
         "misfits": np.array([record.terms["misfit"] for record in found.history]),
