@@ -134,7 +134,9 @@ def _integrals(
         charges[rows] = patch.charges(*at).reshape(-1, len(weights)) * (width**2 * weights)
     flat = points.reshape(-1, 3)
     if of._in_magnets(flat).any():
-        raise ValueError(f"{on!r} and {of!r} overlap: the force between them is not that of two magnets")
+        raise ValueError(
+            f"{on!r} and {of!r} overlap or touch: the force between them is not that of two magnets that are apart"
+        )
     flux = of.flux_density(flat)
     _require_numbers(flux, on, of)
     forces = charges[..., None] * flux.reshape(points.shape)
