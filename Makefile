@@ -21,6 +21,7 @@ cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 .DEFAULT_GOAL := help
 .PHONY: help demo test quick seconds docs gallery wheel sanitize processors lint format stubs clean
 .DELETE_ON_ERROR:
+.SECONDARY:
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -85,10 +86,11 @@ $(VENV)/.created: scripts/setup.sh
 
 # A wheel of the package, with the kernels that tests and benchmarks call, and that one installed. build/make is kept for the
 # next time; a plain `pip install .` builds in a directory of its own, so that its options do not end up in this one's cache.
+# Without MAKEFLAGS, as Ninja would take the number of jobs from it, which is that of recipes.
 $(VENV)/.wheel: $(sources) $(VENV)/.created
 	rm -rf build/wheels
 	@echo "Building magshell (some minutes the first time; all that is said goes into build/make.log):"
-	@$(VENV)/bin/python scripts/build_progress.py build/make.log \
+	@env -u MAKEFLAGS $(VENV)/bin/python scripts/build_progress.py build/make.log \
 	    $(PIP) wheel --verbose --no-deps --no-build-isolation --check-build-dependencies \
 	    --config-settings=build-dir=build/make --config-settings=cmake.define.MAGSHELL_TESTING=ON \
 	    --config-settings=cmake.define.MAGSHELL_COMPILE_TOGETHER=$(COMPILE_TOGETHER) --wheel-dir build/wheels .
@@ -100,8 +102,15 @@ $(VENV)/.lint: pyproject.toml $(VENV)/.created
 	$(PIP) install --quiet $$(grep -oE '(ruff|clang-format)==[0-9.]+' pyproject.toml)
 	touch $@
 
-# What one of pyproject.toml's extras brings beside it.
-$(VENV)/.with-%: $(VENV)/.wheel
+# What one of pyproject.toml's extras brings beside it. `make -j` downloads and unpacks it while the package is compiled.
+$(VENV)/.needs-%: pyproject.toml scripts/requirements.py $(VENV)/.created
 	@echo "Installing what the extra '$*' brings beside it:"
+	@mkdir -p build
+	$(VENV)/bin/python scripts/requirements.py $* >build/requirements-$*.txt
+	$(PIP) install --quiet -r build/requirements-$*.txt
+	touch $@
+
+# The package with one of its extras: by now pip only compares.
+$(VENV)/.with-%: $(VENV)/.wheel $(VENV)/.needs-%
 	$(PIP) install --quiet "$$(echo build/wheels/*.whl)[$*]"
 	touch $@
