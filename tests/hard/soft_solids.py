@@ -33,7 +33,7 @@ def ventricle(
     } | material
     solid = ms.Solid(mesh, material=ms.Guccione(**properties))
     base = np.flatnonzero(np.abs(solid.mesh.rest_positions[:, 2] - 5e-3) < 1e-9)
-    inside = ms.Pressure(pressure, faces=unit.faces_at(z=0.0))
+    inside = ms.Pressure(pressure, faces=sides_between(mesh, unit.vertices_at(z=0.0)))
     supports = [ms.Pin(base), ms.SymmetryPlane((1, 0, 0)), ms.SymmetryPlane((0, 1, 0))]
     return ms.Scene(solid, supports=supports, loads=[inside])
 
@@ -46,14 +46,18 @@ def thick_tube(pressure: float) -> ms.Scene:
     angle = 0.5 * np.pi * around
     radius = inner + (outer - inner) * radial
     x = np.stack([radius * np.cos(angle), radius * np.sin(angle), half * along], axis=1)
-    solid = ms.Solid(
-        ms.TetMesh(x, unit.tetrahedra), material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.4999)
-    )
+    mesh = ms.TetMesh(x, unit.tetrahedra)
+    solid = ms.Solid(mesh, material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.4999))
     ends = (
         pressure * inner**2 / (outer**2 - inner**2)
     )  # axial traction [Pa] that rigid end caps transmit to the wall
     loads = [
-        ms.Pressure(pressure, faces=unit.faces_at(x=0.0)),
-        ms.Pressure(-ends, faces=unit.faces_at(z=1.0)),
+        ms.Pressure(pressure, faces=sides_between(mesh, unit.vertices_at(x=0.0))),
+        ms.Pressure(-ends, faces=sides_between(mesh, unit.vertices_at(z=1.0))),
     ]
     return ms.Scene(solid, supports=[ms.SymmetryPlane(normal) for normal in np.eye(3)], loads=loads)
+
+
+def sides_between(mesh: ms.TetMesh, vertices: np.ndarray) -> np.ndarray:
+    """Return the faces of a quadratic solid, four a side, on the sides of its mesh whose corners are all among vertices."""
+    return (4 * mesh.faces_between(vertices)[:, None] + np.arange(4)).ravel()
