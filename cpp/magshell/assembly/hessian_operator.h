@@ -19,6 +19,8 @@ class RoughHessianOperator : public HessianOperator {  // plain-words: ok
   public:
     /// Adds nearly the product with x to y, for linear solves that need not be exact.
     virtual void add_rough_product(const VectorXd& x, VectorXd& y) const = 0;  // plain-words: ok
+    /// Returns whether it differs from the exact product.
+    virtual bool is_rough() const = 0;  // plain-words: ok, of products
 };
 
 }  // namespace magshell

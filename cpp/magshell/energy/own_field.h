@@ -97,6 +97,8 @@ class OwnField {
     /// Trees if the sums are not direct.
     struct Neighbours {
         std::vector<std::array<Index, 2>> elements, sides;
+        Index with_fine =
+            0;  // so many of the pairs of elements have the fine points, the others the medium ones
         std::shared_ptr<const Trees> trees;
         bool is_rough = false;  // for products that need not be exact. plain-words: ok, of products
     };
@@ -124,7 +126,11 @@ class OwnField {
 
     /// Finds the near pairs of sources at positions q of all nodes.
     Neighbours neighbours(const double* q) const { return neighbours(q, Targets::sources); }
-    /// Returns the same pairs with trees of a low accuracy, for products with the Hessian that need not be exact.
+    /// Returns whether products with the Hessian that need not be exact take less time.
+    bool has_rough_products() const {  // plain-words: ok
+        return n_points() > most_direct_rough && accuracy_ > 0.0;
+    }
+    /// Returns the nearest of these pairs and trees of a low accuracy, for products with the Hessian that need not be exact.
     Neighbours rough(const double* q, const Neighbours& near) const;  // plain-words: ok, of products
     /// Returns the energy [J] and sets its gradient [N] by the position of each of nodes().
     double gradient(const double* q, const Neighbours& near, std::vector<Vec3>& by_position) const;

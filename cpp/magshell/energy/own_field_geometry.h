@@ -18,17 +18,22 @@ namespace own_field {
 
 inline constexpr double strength = vacuum_permeability / (4.0 * std::numbers::pi);  // mu_0/(4 pi)
 inline constexpr int block = 16;  // targets that a thread takes at once
+inline constexpr Index block_of_pairs =
+    128;  // near pairs, so many that lanes are left empty in few of each kind
 
 struct GaussRule {
     int count;
     const double *points, *weights;  // on [0, 1]
 };
 inline constexpr double points_2[] = {0.21132486540518712, 0.78867513459481288}, weights_2[] = {0.5, 0.5},
+                        points_3[] = {0.11270166537925831, 0.5, 0.88729833462074169},
+                        weights_3[] = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0},
                         points_4[] = {0.069431844202973712, 0.33000947820757187, 0.66999052179242813,
                                       0.93056815579702629},
                         weights_4[] = {0.17392742256872693, 0.32607257743127307, 0.32607257743127307,
                                        0.17392742256872693};
-inline constexpr GaussRule coarse{2, points_2, weights_2}, fine{4, points_4, weights_4};
+inline constexpr GaussRule coarse{2, points_2, weights_2}, medium{3, points_3, weights_3},
+    fine{4, points_4, weights_4};
 
 // Barycentric coordinates of the three points of a face, of equal weights; exact for quadratic functions.
 inline constexpr double face_points[3][3] = {
@@ -48,6 +53,10 @@ struct Blend {
     double near, far;
 };
 inline constexpr Blend of_elements{1.5, 2.0}, of_sides{2.5, 3.5};
+
+// The relative distances of near edges up to which products that need few digits take the fine points, and from which on they take the
+// coarse ones, without blending; between these they take the medium points [-]. See test_rough_products_are_close_to_exact_ones.
+inline constexpr Blend of_rough_products{1.2, 1.7};  // plain-words: ok, of products
 
 // Returns the parts of two sizes in the derivative of the larger one: halves where they are the same.
 inline std::array<double, 2> parts_of_larger(double first, double second) {
@@ -70,8 +79,9 @@ void fill_in_order(Index n_pairs, const Fill& fill, const Add& add) {
     std::vector<Entry> entries(static_cast<std::size_t>(std::min(chunk, n_pairs)));
     for (Index begin = 0; begin < n_pairs; begin += chunk) {
         const Index count = std::min(chunk, n_pairs - begin);
-        in_blocks(count, [&](Index first, Index last) {
-            fill(begin + first, last - first, entries.data() + first);
+        parallel_for((count + block_of_pairs - 1) / block_of_pairs, [&](int part) {
+            const Index first = part * block_of_pairs;
+            fill(begin + first, std::min(block_of_pairs, count - first), entries.data() + first);
         });
         for (Index k = 0; k < count; ++k) add(begin + k, entries[k]);
     }

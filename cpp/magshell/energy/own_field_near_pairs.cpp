@@ -12,14 +12,16 @@ namespace {
 template <class T>
 using PairAdjoint = std::array<PoseAdjoint<T>, 2>;
 
-// Sets the derivatives for pairs of two kinds of elements, those with these numbers in a block.
+// Sets the derivatives for pairs of two kinds of elements, those with these numbers in a block. near: the rule that replaces the coarse
+// points.
 template <class Value, class T>
 void set_pairs(const std::vector<ElementPose<T>>& poses, const Units& units,
                const std::array<Index, 2>* pairs, const std::vector<Index>& numbers,
-               const std::array<bool, 2>& are_edges, PairAdjoint<T>* out) {
+               const std::array<bool, 2>& are_edges, const GaussRule& near, PairAdjoint<T>* out) {
     using Pairs = ElementPairs<T, Value>;
     using Points = PointsOfKinds<typename Pairs::Pair::Number>;
-    static const Points few(coarse), many(fine);
+    static const Points few(coarse), some(medium), most(fine);
+    const Points& many = &near == &medium ? some : most;
     const Index count = static_cast<Index>(numbers.size());
     for (Index begin = 0; begin < count; begin += Pairs::width) {
         Pairs sums(units);
@@ -51,13 +53,17 @@ void OwnField::add_near_pairs(const Geometry<T>& at, const Neighbours& near, Tar
         const auto is_edge = [&](Index k) { return elements_[element_order_[k]].is_edge(); };
         for (const bool first : {false, true})
             for (const bool second : {false, true}) {
-                std::vector<Index> numbers;
+                std::vector<Index> with_fine, with_medium;
                 for (Index k = 0; k < count; ++k)
-                    if (is_edge(pairs[k][0]) == first && is_edge(pairs[k][1]) == second) numbers.push_back(k);
-                if (has_rates && near.is_rough)
-                    set_pairs<SimdFloat>(poses, units, pairs, numbers, {first, second}, adjoints);
-                else
-                    set_pairs<SimdDouble>(poses, units, pairs, numbers, {first, second}, adjoints);
+                    if (is_edge(pairs[k][0]) == first && is_edge(pairs[k][1]) == second)
+                        (begin + k < near.with_fine ? with_fine : with_medium).push_back(k);
+                const std::array<bool, 2> are_edges{first, second};
+                if (has_rates && near.is_rough) {
+                    set_pairs<SimdFloat>(poses, units, pairs, with_fine, are_edges, fine, adjoints);
+                    set_pairs<SimdFloat>(poses, units, pairs, with_medium, are_edges, medium, adjoints);
+                } else {
+                    set_pairs<SimdDouble>(poses, units, pairs, with_fine, are_edges, fine, adjoints);
+                }
             }
     };
     fill_in_order<PairAdjoint<T>>(static_cast<Index>(near.elements.size()), fill,

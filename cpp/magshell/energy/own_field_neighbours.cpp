@@ -113,6 +113,7 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
         near_balls(all, sources, [](Index k) { return k; });  // those with a source come first
     for (Index k = 0; k < target_elements(targets); ++k)
         for (const Index j : near_elements[k]) near.elements.push_back({k, j});
+    near.with_fine = static_cast<Index>(near.elements.size());
     if (n_points() > most_direct && accuracy_ > 0.0) near.trees = trees(x, targets, accuracy_);
     if (!has_sides(targets)) return near;
     for (Index k = 0; k < target_faces(targets); ++k) {
@@ -130,9 +131,23 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
 OwnField::Neighbours OwnField::rough(const double* q, const Neighbours& near) const {
     constexpr double accuracy = 1e-3;  // [-] see test_rough_products_are_close_to_exact_ones
     Neighbours rough = near;
-    rough.is_rough = n_points() > most_direct_rough && accuracy_ > 0.0;
-    if (rough.is_rough)
-        rough.trees = trees(positions<double>(q, nullptr), Targets::sources, std::max(accuracy, accuracy_));
+    rough.is_rough = has_rough_products();
+    if (!rough.is_rough) return rough;
+    const std::vector<Triple<double>> x = positions<double>(q, nullptr);
+    const Geometry<double> at(*this, x);
+    const auto within = [&](const std::array<Index, 2>& pair, double limit) {
+        const Index first = element_order_[pair[0]], second = element_order_[pair[1]];
+        const double size = std::max({elements_[first].length, elements_[second].length,
+                                      element_thickness_[first], element_thickness_[second]});
+        return !elements_[first].is_edge() || !elements_[second].is_edge() ||
+               norm(at.middle(elements_[first]) - at.middle(elements_[second])) < limit * size;
+    };
+    std::erase_if(rough.elements, [&](const auto& pair) { return !within(pair, of_rough_products.far); });
+    const auto others =
+        std::stable_partition(rough.elements.begin(), rough.elements.end(),
+                              [&](const auto& pair) { return within(pair, of_rough_products.near); });
+    rough.with_fine = static_cast<Index>(others - rough.elements.begin());
+    rough.trees = trees(x, Targets::sources, std::max(accuracy, accuracy_));
     return rough;
 }
 

@@ -310,6 +310,13 @@ std::function<VectorXd(const VectorXd&)> Model::operator_product(bool rough) con
     };
 }
 
+bool Model::operators_are_rough() const {
+    return std::any_of(operators_.begin(), operators_.end(), [](const auto& each) {
+        const auto* const quick = dynamic_cast<const RoughHessianOperator*>(each.get());
+        return quick && quick->is_rough();
+    });
+}
+
 // Finds the columns that each element block clears before it assembles: those of its own nodes that no earlier block has. The last entry has
 // the columns that no block touches.
 void Model::assign_columns() {

@@ -54,6 +54,8 @@ class Model {
     /// Returns the product of operators() with a vector of the free dofs, linearized as at the call; empty if there are none. rough: nearly
     /// that product in less time. The model must outlive it.
     std::function<VectorXd(const VectorXd&)> operator_product(bool rough) const;
+    /// Returns whether nearly that product differs from the exact one.
+    bool operators_are_rough() const;  // plain-words: ok, of products
     SystemMatrix* contact_matrix();
     const Residual& residual() const { return residual_; }
     Index size() const { return nodes().n_dofs(); }

@@ -53,10 +53,14 @@ namespace {
 // Iteration from which on steps must shrink; see test_a_thin_strip_rolled_up.
 constexpr int settling_iterations = 6;
 
+// [-] Least tolerance of linear solves whose products are nearly exact: an iteration with exact products takes longer than two with these.
+// See test_newton_converges_alike_by_rough_products.
+constexpr double least_by_rough_products = 1e-4;
+
 // Returns the tolerance of the linear solve with a nonsymmetric matrix (inexact Newton, N&W 7.1): the forcing term that keeps quadratic
-// convergence, and no less than the tolerance of the residual needs.
-double forcing_term(double residual, double tolerance) {
-    return std::max(small_part * tolerance / residual, std::min(negligible_part, residual));
+// convergence, and no less than `least` and than the tolerance of the residual needs.
+double forcing_term(double residual, double tolerance, double least) {
+    return std::max({least, small_part * tolerance / residual, std::min(negligible_part, residual)});
 }
 
 // Full steps, mixed or standard, that stop early where a load step allows or asks for it.
@@ -175,12 +179,22 @@ class FullSteps final : public NewtonIteration {
         return each < small_part && std::log(tolerance_ / report_.residual) >= worth * std::log(each);
     }
 
+    // Returns the least tolerance of a linear solve. Products that are nearly exact suffice while the residual shrinks, and nothing is known of
+    // that before the first step.
+    double least_tolerance(double contraction) const {
+        if (!model_.operators_are_rough()) return 0.0;
+        if (report_.iterations == 0)
+            return std::max(least_by_rough_products, std::min(negligible_part, std::sqrt(report_.residual)));
+        return contraction <= small_part ? least_by_rough_products : 0.0;
+    }
+
     // Loads without potential act on few nodes, so GMRES takes few vectors and solves to the usual tolerance.
-    VectorXd solve(const VectorXd& force) {
+    VectorXd solve(const VectorXd& force, double contraction) {
         const bool has_operators = !model_.operators().empty();
         const VectorXd step =
             proximal_.motion || has_operators
-                ? newton_.solve_with_factor(force, forcing_term(report_.residual, tolerance_))
+                ? newton_.solve_with_factor(
+                      force, forcing_term(report_.residual, tolerance_, least_tolerance(contraction)))
                 : newton_.solve_with_factor(force);
         if (has_operators && policy_.defers_count && in_place_ && force.dot(step) < 0.0)
             ++report_.factor.negative_pivots;
@@ -195,10 +209,10 @@ class FullSteps final : public NewtonIteration {
         const bool reused = can_reuse_factor(contraction);
         if (!reused && !refactorize(contraction)) return false;
         const VectorXd force = -newton_.gradient(q_, proximal_) - pull_.col(0);
-        VectorXd step = solve(force);
+        VectorXd step = solve(force, contraction);
         if (reused && in_place_ && newton_.contact_force_change(step) > small_part * force.norm()) {
             if (!refactorize(contraction)) return false;
-            step = solve(force);
+            step = solve(force, contraction);
         }
         const VectorXd from = model_.capabilities().has_barrier && in_place_ ? q_ : VectorXd();
         if (policy_.inexact) last_.from = q_;

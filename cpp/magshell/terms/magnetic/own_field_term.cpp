@@ -37,6 +37,7 @@ class OwnFieldTerm::Hessian final : public RoughHessianOperator {
         std::call_once(has_rough_, [this] { rough_ = field_->rough(q_.data(), near_); });
         add(rough_, x, y);
     }
+    bool is_rough() const override { return field_->has_rough_products(); }
 
   private:
     void add(const OwnField::Neighbours& near, const VectorXd& x, VectorXd& y) const {
