@@ -97,8 +97,8 @@ class OwnField {
     /// Trees if the sums are not direct.
     struct Neighbours {
         std::vector<std::array<Index, 2>> elements, sides;
-        Index with_fine =
-            0;  // so many of the pairs of elements have the fine points, the others the medium ones
+        // so many of them come first that have the fine points; the others have the medium ones
+        Index elements_with_fine = 0, sides_with_fine = 0;
         std::shared_ptr<const Trees> trees;
         bool is_rough = false;  // for products that need not be exact. plain-words: ok, of products
     };
@@ -272,6 +272,10 @@ class OwnField {
     template <class T>
     void add_near_sides(const Geometry<T>& at, const Neighbours& near, Targets targets,
                         std::vector<T>& potentials, Evaluation<T>& out) const;
+    bool is_edge_of(Index element, Index face) const {
+        const Element& e = elements_[element];
+        return e.is_edge() && (e.bodies[0] == face || e.bodies[1] == face);
+    }
     /// Returns true if all nodes of an element belong to the rigid body of a dipole.
     bool is_part_of(Index element, Index dipole) const {
         for (int k = 0; k < elements_[element].n_nodes(); ++k)

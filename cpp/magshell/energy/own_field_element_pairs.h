@@ -84,15 +84,13 @@ class ElementPairs {
     using Points = ElementPoints<typename Pair::Number>;
     static constexpr int width = Value::width;
 
-    explicit ElementPairs(const Units& units) : units_(units) {}
-
     void set(int lane, const ElementPose<T>& first, const ElementPose<T>& second) {
-        Pair::set(apart_, lane, first.middle - second.middle, units_.rate);
+        Pair::set(apart_, lane, first.middle - second.middle);
         const ElementPose<T>* const poses[2] = {&first, &second};
         for (int side = 0; side < 2; ++side) {
-            for (int k = 0; k < 2; ++k) Pair::set(axes_[side][k], lane, poses[side]->axes[k], units_.rate);
-            Pair::set(charges_[side], lane, T(1.0 / units_.charge) * poses[side]->charge, units_.rate);
-            Pair::set(currents_[side], lane, T(1.0 / units_.charge) * poses[side]->current, units_.rate);
+            for (int k = 0; k < 2; ++k) Pair::set(axes_[side][k], lane, poses[side]->axes[k]);
+            Pair::set(charges_[side], lane, poses[side]->charge);
+            Pair::set(currents_[side], lane, poses[side]->current);
         }
         parts_[lane] = parts_of_larger(first.size, second.size);
         inverse_size_.set(lane, 1.0 / std::max(first.size, second.size));
@@ -162,25 +160,21 @@ class ElementPairs {
         }
     }
 
+    /// Returns the derivatives over mu_0/(4 pi).
     std::array<PoseAdjoint<T>, 2> operator()(int lane) const {
-        const double by_charge = strength * units_.charge, energy = by_charge * units_.charge;
-        const auto get = [&](const auto& a, double factor) {
-            return Pair::get(a, lane, factor, units_.rate);
-        };
         std::array<PoseAdjoint<T>, 2> out;
-        out[0].middle = get(by_middle_, energy);
+        out[0].middle = Pair::get(by_middle_, lane);
         out[1].middle = -out[0].middle;
         for (int side = 0; side < 2; ++side) {
-            for (int k = 0; k < 2; ++k) out[side].axes[k] = get(by_axes_[side][k], energy);
-            out[side].charge = get(by_charges_[side], by_charge);
-            out[side].current = get(by_currents_[side], by_charge);
-            out[side].size = get(by_size_, energy * parts_[lane][side]);
+            for (int k = 0; k < 2; ++k) out[side].axes[k] = Pair::get(by_axes_[side][k], lane);
+            out[side].charge = Pair::get(by_charges_[side], lane);
+            out[side].current = Pair::get(by_currents_[side], lane);
+            out[side].size = T(parts_[lane][side]) * Pair::get(by_size_, lane);
         }
         return out;
     }
 
   private:
-    Units units_;
     std::array<std::array<double, 2>, width> parts_{};
     Value inverse_size_{};
     Vector apart_{}, axes_[2][2]{};

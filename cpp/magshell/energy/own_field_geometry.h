@@ -39,11 +39,21 @@ inline constexpr GaussRule coarse{2, points_2, weights_2}, medium{3, points_3, w
 inline constexpr double face_points[3][3] = {
     {2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0}, {1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0}, {1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0}};
 
-// Four points of a triangle, exact for cubic functions [Strang, Fix 1973]; near ones have the sixteen of energy/face_points.h.
+// Four points of a triangle, exact for cubic functions, and seven for functions of fifth degree [Strang, Fix 1973]; near ones have the
+// sixteen of energy/face_points.h.
 inline constexpr FacePoint triangle_points[4] = {{{1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}, 0.0, -27.0 / 48.0},
                                                  {{0.6, 0.2, 0.2}, 0.0, 25.0 / 48.0},
                                                  {{0.2, 0.6, 0.2}, 0.0, 25.0 / 48.0},
                                                  {{0.2, 0.2, 0.6}, 0.0, 25.0 / 48.0}};
+
+inline constexpr FacePoint medium_triangle_points[7] = {
+    {{1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}, 0.0, 9.0 / 40.0},
+    {{0.059715871789769820, 0.47014206410511509, 0.47014206410511509}, 0.0, 0.13239415278850618},
+    {{0.47014206410511509, 0.059715871789769820, 0.47014206410511509}, 0.0, 0.13239415278850618},
+    {{0.47014206410511509, 0.47014206410511509, 0.059715871789769820}, 0.0, 0.13239415278850618},
+    {{0.79742698535308732, 0.10128650732345634, 0.10128650732345634}, 0.0, 0.12593918054482715},
+    {{0.10128650732345634, 0.79742698535308732, 0.10128650732345634}, 0.0, 0.12593918054482715},
+    {{0.10128650732345634, 0.10128650732345634, 0.79742698535308732}, 0.0, 0.12593918054482715}};
 
 // The relative distance t of a pair up to which it is near, and from which on it is far [-]; between these its two values
 // are blended. t is the distance of the midpoints over the larger size: of two elements, or of an element and the face whose
@@ -54,9 +64,10 @@ struct Blend {
 };
 inline constexpr Blend of_elements{1.5, 2.0}, of_sides{2.5, 3.5};
 
-// The relative distances of near edges up to which products that need few digits take the fine points, and from which on they take the
+// The relative distances of near pairs up to which products that need few digits take the fine points, and from which on they take the
 // coarse ones, without blending; between these they take the medium points [-]. See test_rough_products_are_close_to_exact_ones.
-inline constexpr Blend of_rough_products{1.2, 1.7};  // plain-words: ok, of products
+inline constexpr Blend of_rough_edges{1.2, 1.7}, of_rough_triangles{1.0, 1.5},
+    of_rough_sides{1.2, 2.2};  // plain-words: ok, of products
 
 // Returns the parts of two sizes in the derivative of the larger one: halves where they are the same.
 inline std::array<double, 2> parts_of_larger(double first, double second) {
@@ -91,6 +102,7 @@ void fill_in_order(Index n_pairs, const Fill& fill, const Add& add) {
 // which a triangle does not have.
 inline std::vector<FacePoint> points_of_triangle(const GaussRule& rule) {
     if (&rule == &coarse) return {std::begin(triangle_points), std::end(triangle_points)};
+    if (&rule == &medium) return {std::begin(medium_triangle_points), std::end(medium_triangle_points)};
     std::vector<FacePoint> points;
     for (std::size_t k = 0; k < face_points::fine.size(); k += 2) {
         points.push_back(face_points::fine[k]);

@@ -118,29 +118,27 @@ struct PairLanes {
     static constexpr int width = Value::width;
 
     static Number number(double a) { return static_cast<Number>(a); }
-    static void set(Lanes& a, int lane, const T& b, double rate_unit) {
+    static void set(Lanes& a, int lane, const T& b) {
         if constexpr (std::is_same_v<T, Dual>) {
             a.value.set(lane, b.value);
-            a.rate.set(lane, b.rate / rate_unit);
+            a.rate.set(lane, b.rate);
         } else {
             a.set(lane, b);
         }
     }
-    static void set(Triple<Lanes>& a, int lane, const Triple<T>& b, double rate_unit) {
-        set(a.x, lane, b.x, rate_unit);
-        set(a.y, lane, b.y, rate_unit);
-        set(a.z, lane, b.z, rate_unit);
+    static void set(Triple<Lanes>& a, int lane, const Triple<T>& b) {
+        set(a.x, lane, b.x);
+        set(a.y, lane, b.y);
+        set(a.z, lane, b.z);
     }
-    /// Returns `factor` times the number in a lane.
-    static T get(const Lanes& a, int lane, double factor, double rate_unit) {
+    static T get(const Lanes& a, int lane) {
         if constexpr (std::is_same_v<T, Dual>)
-            return {factor * a.value[lane], factor * rate_unit * a.rate[lane]};
+            return {a.value[lane], a.rate[lane]};
         else
-            return factor * a[lane];
+            return a[lane];
     }
-    static Triple<T> get(const Triple<Lanes>& a, int lane, double factor, double rate_unit) {
-        return {get(a.x, lane, factor, rate_unit), get(a.y, lane, factor, rate_unit),
-                get(a.z, lane, factor, rate_unit)};
+    static Triple<T> get(const Triple<Lanes>& a, int lane) {
+        return {get(a.x, lane), get(a.y, lane), get(a.z, lane)};
     }
     static Triple<Lanes> scaled(const Value& factor, const Triple<Lanes>& a) {
         return {factor * a.x, factor * a.y, factor * a.z};

@@ -90,6 +90,15 @@ std::vector<std::size_t> positions_in(const SourceTree& tree) {
     return positions;
 }
 
+// Removes the pairs that are not within the far limit, and puts those within the near limit first; returns how many these are.
+template <class Within>
+Index keep_nearest(std::vector<std::array<Index, 2>>& pairs, const Within& within) {
+    std::erase_if(pairs, [&](const auto& pair) { return !within(pair, &Blend::far); });
+    const auto others = std::stable_partition(pairs.begin(), pairs.end(),
+                                              [&](const auto& pair) { return within(pair, &Blend::near); });
+    return static_cast<Index>(others - pairs.begin());
+}
+
 }  // namespace
 
 OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) const {
@@ -113,7 +122,7 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
         near_balls(all, sources, [](Index k) { return k; });  // those with a source come first
     for (Index k = 0; k < target_elements(targets); ++k)
         for (const Index j : near_elements[k]) near.elements.push_back({k, j});
-    near.with_fine = static_cast<Index>(near.elements.size());
+    near.elements_with_fine = static_cast<Index>(near.elements.size());
     if (n_points() > most_direct && accuracy_ > 0.0) near.trees = trees(x, targets, accuracy_);
     if (!has_sides(targets)) return near;
     for (Index k = 0; k < target_faces(targets); ++k) {
@@ -125,6 +134,7 @@ OwnField::Neighbours OwnField::neighbours(const double* q, Targets targets) cons
         near_balls(side_elements, side_faces, [&](Index k) { return wanted(k) ? target_faces(targets) : 0; });
     for (Index k = 0; k < target_elements(targets); ++k)
         for (const Index j : near_faces[k]) near.sides.push_back({k, j});
+    near.sides_with_fine = static_cast<Index>(near.sides.size());
     return near;
 }
 
@@ -135,18 +145,22 @@ OwnField::Neighbours OwnField::rough(const double* q, const Neighbours& near) co
     if (!rough.is_rough) return rough;
     const std::vector<Triple<double>> x = positions<double>(q, nullptr);
     const Geometry<double> at(*this, x);
-    const auto within = [&](const std::array<Index, 2>& pair, double limit) {
+    const auto size_of = [&](Index e) { return std::max(elements_[e].length, element_thickness_[e]); };
+    const auto are_elements_within = [&](const std::array<Index, 2>& pair, double Blend::* limit) {
         const Index first = element_order_[pair[0]], second = element_order_[pair[1]];
-        const double size = std::max({elements_[first].length, elements_[second].length,
-                                      element_thickness_[first], element_thickness_[second]});
-        return !elements_[first].is_edge() || !elements_[second].is_edge() ||
-               norm(at.middle(elements_[first]) - at.middle(elements_[second])) < limit * size;
+        const bool edges = elements_[first].is_edge() && elements_[second].is_edge();
+        return norm(at.middle(elements_[first]) - at.middle(elements_[second])) <
+               (edges ? of_rough_edges : of_rough_triangles).*limit *
+                   std::max(size_of(first), size_of(second));
     };
-    std::erase_if(rough.elements, [&](const auto& pair) { return !within(pair, of_rough_products.far); });
-    const auto others =
-        std::stable_partition(rough.elements.begin(), rough.elements.end(),
-                              [&](const auto& pair) { return within(pair, of_rough_products.near); });
-    rough.with_fine = static_cast<Index>(others - rough.elements.begin());
+    rough.elements_with_fine = keep_nearest(rough.elements, are_elements_within);
+    const auto are_sides_within = [&](const std::array<Index, 2>& pair, double Blend::* limit) {
+        const Index e = element_order_[pair[0]], f = face_order_[pair[1]];
+        return is_edge_of(e, f) ||
+               norm(at.middle(elements_[e]) - at.center(faces_[f])) <
+                   of_rough_sides.*limit * std::max({size_of(e), faces_[f].size, thickness_[f]});
+    };
+    rough.sides_with_fine = keep_nearest(rough.sides, are_sides_within);
     rough.trees = trees(x, Targets::sources, std::max(accuracy, accuracy_));
     return rough;
 }

@@ -54,5 +54,56 @@ struct FacePoseAdjoint {
     }
 };
 
+// Returns a number or a vector times `factor`, its rate also times rate_factor.
+inline double scaled(double a, double factor, double) {
+    return factor * a;
+}
+inline Dual scaled(const Dual& a, double factor, double rate_factor) {
+    return {factor * a.value, factor * rate_factor * a.rate};
+}
+template <class T>
+Triple<T> scaled(const Triple<T>& a, double factor, double rate_factor) {
+    return {scaled(a.x, factor, rate_factor), scaled(a.y, factor, rate_factor),
+            scaled(a.z, factor, rate_factor)};
+}
+
+/// Returns a pose with charge and current times a factor, and with all rates times another one.
+template <class T>
+ElementPose<T> scaled(const ElementPose<T>& pose, double charge_factor, double rate_factor) {
+    return {scaled(pose.middle, 1.0, rate_factor),
+            {scaled(pose.axes[0], 1.0, rate_factor), scaled(pose.axes[1], 1.0, rate_factor)},
+            scaled(pose.charge, charge_factor, rate_factor),
+            scaled(pose.current, charge_factor, rate_factor),
+            pose.size};
+}
+template <class T>
+FacePose<T> scaled(const FacePose<T>& pose, double charge_factor, double rate_factor) {
+    return {{scaled(pose.corners[0], 1.0, rate_factor), scaled(pose.corners[1], 1.0, rate_factor),
+             scaled(pose.corners[2], 1.0, rate_factor)},
+            scaled(pose.level, 1.0, rate_factor),
+            scaled(pose.current, charge_factor, rate_factor),
+            charge_factor * pose.charge,
+            pose.size};
+}
+
+/// Returns derivatives times `energy`, those by charge and current times by_charge, and with all rates times a factor.
+template <class T>
+PoseAdjoint<T> scaled(const PoseAdjoint<T>& by, double energy, double by_charge, double rate_factor) {
+    return {scaled(by.middle, energy, rate_factor),
+            {scaled(by.axes[0], energy, rate_factor), scaled(by.axes[1], energy, rate_factor)},
+            scaled(by.charge, by_charge, rate_factor),
+            scaled(by.current, by_charge, rate_factor),
+            scaled(by.size, energy, rate_factor)};
+}
+template <class T>
+FacePoseAdjoint<T> scaled(const FacePoseAdjoint<T>& by, double energy, double by_charge, double rate_factor) {
+    return {{scaled(by.corners[0], energy, rate_factor), scaled(by.corners[1], energy, rate_factor),
+             scaled(by.corners[2], energy, rate_factor)},
+            scaled(by.level, energy, rate_factor),
+            scaled(by.current, by_charge, rate_factor),
+            scaled(by.charge, by_charge, rate_factor),
+            scaled(by.size, energy, rate_factor)};
+}
+
 }  // namespace own_field
 }  // namespace magshell

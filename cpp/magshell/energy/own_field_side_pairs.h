@@ -78,16 +78,13 @@ class SidePairs {
     using Points = ElementPoints<typename Pair::Number>;
     static constexpr int width = Value::width;
 
-    explicit SidePairs(const Units& units) : units_(units) {}
-
     void set(int lane, const ElementPose<T>& element, const FacePose<T>& face) {
-        for (int k = 0; k < 3; ++k)
-            Pair::set(corners_[k], lane, face.corners[k] - element.middle, units_.rate);
-        for (int k = 0; k < 2; ++k) Pair::set(axes_[k], lane, element.axes[k], units_.rate);
-        Pair::set(level_, lane, face.level, units_.rate);
-        Pair::set(charge_, lane, T(1.0 / units_.charge) * element.charge, units_.rate);
-        Pair::set(current_, lane, T(1.0 / units_.face) * face.current, units_.rate);
-        side_charge_.set(lane, face.charge / units_.face);
+        for (int k = 0; k < 3; ++k) Pair::set(corners_[k], lane, face.corners[k] - element.middle);
+        for (int k = 0; k < 2; ++k) Pair::set(axes_[k], lane, element.axes[k]);
+        Pair::set(level_, lane, face.level);
+        Pair::set(charge_, lane, element.charge);
+        Pair::set(current_, lane, face.current);
+        side_charge_.set(lane, face.charge);
         parts_[lane] = parts_of_larger(element.size, face.size);
         inverse_size_.set(lane, 1.0 / std::max(element.size, face.size));
     }
@@ -175,22 +172,18 @@ class SidePairs {
         by_side_charge_ = scaled * points_.value;
     }
 
+    /// Returns the derivatives over mu_0/(4 pi).
     SideAdjoint<T> operator()(int lane) const {
-        const double by_charge = strength * units_.face, by_face = strength * units_.charge,
-                     energy = by_face * units_.face;
-        const auto get = [&](const auto& a, double factor) {
-            return Pair::get(a, lane, factor, units_.rate);
-        };
         SideAdjoint<T> out;
-        out.element.middle = get(by_middle_, energy);
-        for (int k = 0; k < 2; ++k) out.element.axes[k] = get(by_axes_[k], energy);
-        out.element.charge = get(by_charge_, by_charge);
-        out.element.size = get(by_size_, energy * parts_[lane][0]);
-        for (int k = 0; k < 3; ++k) out.face.corners[k] = get(by_corner_[k], energy);
-        out.face.level = get(by_level_, energy);
-        out.face.current = get(by_current_, by_face);
-        out.face.charge = get(by_side_charge_, by_face);
-        out.face.size = get(by_size_, energy * parts_[lane][1]);
+        out.element.middle = Pair::get(by_middle_, lane);
+        for (int k = 0; k < 2; ++k) out.element.axes[k] = Pair::get(by_axes_[k], lane);
+        out.element.charge = Pair::get(by_charge_, lane);
+        out.element.size = T(parts_[lane][0]) * Pair::get(by_size_, lane);
+        for (int k = 0; k < 3; ++k) out.face.corners[k] = Pair::get(by_corner_[k], lane);
+        out.face.level = Pair::get(by_level_, lane);
+        out.face.current = Pair::get(by_current_, lane);
+        out.face.charge = Pair::get(by_side_charge_, lane);
+        out.face.size = T(parts_[lane][1]) * Pair::get(by_size_, lane);
         return out;
     }
 
@@ -201,7 +194,6 @@ class SidePairs {
         Vector by_corner[3]{}, by_level{}, by_axes[2]{};
     };
 
-    Units units_;
     std::array<std::array<double, 2>, width> parts_{};
     Value inverse_size_{}, side_charge_{};
     Vector corners_[3]{}, axes_[2]{}, level_{};  // corners: from the middle of the element

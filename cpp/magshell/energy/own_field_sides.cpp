@@ -9,17 +9,19 @@ using namespace own_field;
 
 namespace {
 
-// Sets the derivatives for the pairs with these numbers in a block. meets: the elements are edges of the faces.
+// Sets the derivatives for the pairs with these numbers in a block. meets: the elements are edges of the faces. near: the rule of the elements
+// where the faces have their solid angles.
 template <class Value, class T>
 void set_sides(const std::vector<ElementPose<T>>& elements, const std::vector<FacePose<T>>& faces,
-               const Units& units, const std::array<Index, 2>* pairs, const std::vector<Index>& numbers,
-               bool edges, bool meets, SideAdjoint<T>* out) {
+               const std::array<Index, 2>* pairs, const std::vector<Index>& numbers, bool edges, bool meets,
+               const GaussRule& near, SideAdjoint<T>* out) {
     using Pairs = SidePairs<T, Value>;
     using Points = PointsOfKinds<typename Pairs::Pair::Number>;
-    static const Points few(coarse), many(fine);
+    static const Points few(coarse), some(medium), most(fine);
+    const Points& many = &near == &medium ? some : most;
     const Index count = static_cast<Index>(numbers.size());
     for (Index begin = 0; begin < count; begin += Pairs::width) {
-        Pairs sums(units);
+        Pairs sums;
         for (int lane = 0; lane < Pairs::width; ++lane) {  // the last pair again in lanes that are left
             const auto& [element, face] = pairs[numbers[std::min(begin + lane, count - 1)]];
             sums.set(lane, elements[element], faces[face]);
@@ -43,36 +45,44 @@ void OwnField::add_near_sides(const Geometry<T>& at, const Neighbours& near, Tar
     for (Index k = 0; k < target_elements(targets); ++k) elements.push_back(at.pose(element_order_[k]));
     for (Index k = 0; k < target_faces(targets); ++k) faces.push_back(at.face_pose(face_order_[k]));
     const Units units = has_rates && near.is_rough ? units_of(at.x, elements, faces) : Units();
+    for (ElementPose<T>& pose : elements) pose = scaled(pose, 1.0 / units.charge, 1.0 / units.rate);
+    for (FacePose<T>& pose : faces) pose = scaled(pose, 1.0 / units.face, 1.0 / units.rate);
     std::vector<PoseAdjoint<T>> of_elements(elements.size());
     std::vector<FacePoseAdjoint<T>> of_faces(faces.size());
     const auto kind_of = [&](const std::array<Index, 2>& pair) {  // 0: triangle, 1: edge, 2: edge of the face
-        const Element& element = elements_[element_order_[pair[0]]];
-        const Index f = face_order_[pair[1]];
-        return !element.is_edge() ? 0 : element.bodies[0] == f || element.bodies[1] == f ? 2 : 1;
+        const Index e = element_order_[pair[0]];
+        return !elements_[e].is_edge() ? 0 : is_edge_of(e, face_order_[pair[1]]) ? 2 : 1;
     };
     const auto fill = [&](Index begin, Index count, SideAdjoint<T>* adjoints) {
         const std::array<Index, 2>* const pairs = near.sides.data() + begin;
-        std::vector<Index> numbers[3];
-        for (Index k = 0; k < count; ++k) numbers[kind_of(pairs[k])].push_back(k);
-        for (int kind = 0; kind < 3; ++kind)
-            if (has_rates && near.is_rough)
-                set_sides<SimdFloat>(elements, faces, units, pairs, numbers[kind], kind > 0, kind == 2,
+        std::vector<Index> with_fine[3], with_medium[3];
+        for (Index k = 0; k < count; ++k)
+            (begin + k < near.sides_with_fine ? with_fine : with_medium)[kind_of(pairs[k])].push_back(k);
+        for (int kind = 0; kind < 3; ++kind) {
+            const bool edges = kind > 0, meets = kind == 2;
+            if (has_rates && near.is_rough) {
+                set_sides<SimdFloat>(elements, faces, pairs, with_fine[kind], edges, meets, fine, adjoints);
+                set_sides<SimdFloat>(elements, faces, pairs, with_medium[kind], edges, meets, medium,
                                      adjoints);
-            else
-                set_sides<SimdDouble>(elements, faces, units, pairs, numbers[kind], kind > 0, kind == 2,
-                                      adjoints);
+            } else {
+                set_sides<SimdDouble>(elements, faces, pairs, with_fine[kind], edges, meets, fine, adjoints);
+            }
+        }
     };
     fill_in_order<SideAdjoint<T>>(static_cast<Index>(near.sides.size()), fill,
                                   [&](Index k, const SideAdjoint<T>& adjoint) {
                                       of_elements[near.sides[k][0]] += adjoint.element;
                                       of_faces[near.sides[k][1]] += adjoint.face;
                                   });
+    const double by_charge = strength * units.face, by_face = strength * units.charge,
+                 energy = by_face * units.face;
     for (std::size_t k = 0; k < elements.size(); ++k) {
-        potentials[k] += of_elements[k].charge;
-        at.add(element_order_[k], of_elements[k], out.elements[element_order_[k]]);
+        const PoseAdjoint<T> by = scaled(of_elements[k], energy, by_charge, units.rate);
+        potentials[k] += by.charge;
+        at.add(element_order_[k], by, out.elements[element_order_[k]]);
     }
     for (std::size_t k = 0; k < faces.size(); ++k)
-        at.add(face_order_[k], of_faces[k], out.faces[face_order_[k]]);
+        at.add(face_order_[k], scaled(of_faces[k], energy, by_face, units.rate), out.faces[face_order_[k]]);
 }
 
 template <class T>

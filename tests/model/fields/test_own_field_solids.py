@@ -232,6 +232,30 @@ def test_tree_sums_of_solids_agree_with_direct_ones(thickness):
     assert not np.array_equal(by_tree[1], exact[1])  # there are more than 8,000 points
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_rough_products_of_solids_are_close_to_exact_ones_and_symmetric(law):
+    """Check tetrahedra that are magnetized at random, with charges between all of them."""
+    rng = np.random.default_rng(8)
+    cells = (6, 5, 4)
+    magnetization = 1e5 * rng.normal(size=(6 * np.prod(cells), 3))
+    solid = block(1e-3 * np.array(cells), cells, magnetization=magnetization, magnetization_law=law)
+    scene = free_scene(solid)
+    model, inputs = scene._model, Inputs(scene, None, None)
+    x = solid.mesh.rest_positions
+    with inputs.in_core():
+        state = model.state(x + 5e-5 * rng.normal(size=x.shape), np.zeros(0))
+        one, other = (model.state(rng.normal(size=x.shape), np.zeros(0)) for _ in range(2))
+        zero = 0 * inputs.load_parameters
+        exact = model.hessian_product(state, inputs.load_parameters, one) - model.hessian_product(
+            state, zero, one
+        )
+        found, of_other = (
+            model.rough_operator_product(state, inputs.load_parameters, v) for v in (one, other)
+        )
+    assert 0.0 < np.linalg.norm(found - exact) < 1.5e-2 * np.linalg.norm(exact)
+    assert abs(other @ found - one @ of_other) < 2e-5 * np.linalg.norm(other) * np.linalg.norm(found)
+
+
 def test_skin_has_the_own_field_of_a_shell_on_the_same_faces():
     mesh = ms.meshes.box((SIDE, SIDE, SIDE), cells=(3, 3, 3))
     top = mesh.faces_at(z=SIDE)
