@@ -446,18 +446,22 @@ void register_model(py::module_& module) {
                     owners = own_field->owners();
                     found = own_field->gap_forces(q.data());
                 }
-                return std::tuple(owners, rows_from(found.taken), rows_from(found.finer), found.sizes,
-                                  found.nearest, found.taken_within, found.finer_within,
-                                  found.nearest_within);
+                const auto actions = [](const OwnField::GapActions& each) {
+                    return std::tuple(rows_from(each.taken), rows_from(each.finer), each.sizes);
+                };
+                return std::tuple(owners, actions(found.forces), actions(found.couples),
+                                  rows_from(found.centers), found.nearest, found.taken_within,
+                                  found.finer_within, found.nearest_within);
             },
             py::arg("q"),
-            "Of each body of the own field: its owner, the force [N] of others on it between near elements, "
-            "as the "
-            "energy has it and at more points, (n, 3) each, the sum of the sizes of the latter on its "
-            "elements [N], and "
-            "the distance of the nearest points [m]. Of its own elements that are near now but not at rest: "
+            "Of each body of the own field: its owner; the force [N] of others on it between near elements, "
+            "as the energy has it and at more points, (n, 3) each, and the sum of the sizes of the latter on "
+            "its "
+            "elements; the same of the couple about its center [N m]; its center (n, 3) [m]; and the "
+            "distance "
+            "of the nearest points [m]. Of its own elements that are near now but not at rest: the sums of "
             "the "
-            "sums of the sizes of their forces, both ways, and the distance.")
+            "sizes of their forces, both ways, and the distance.")
         .def(
             "low_rank",
             [](Model& model, bool reduced) {

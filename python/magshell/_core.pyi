@@ -578,16 +578,24 @@ class Model:
         self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> tuple[
         list[str],
+        tuple[
+            typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+            typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+            list[float],
+        ],
+        tuple[
+            typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+            typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+            list[float],
+        ],
         typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
-        typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
-        list[float],
         list[float],
         list[float],
         list[float],
         list[float],
     ]:
         """
-        Of each body of the own field: its owner, the force [N] of others on it between near elements, as the energy has it and at more points, (n, 3) each, the sum of the sizes of the latter on its elements [N], and the distance of the nearest points [m]. Of its own elements that are near now but not at rest: the sums of the sizes of their forces, both ways, and the distance.
+        Of each body of the own field: its owner; the force [N] of others on it between near elements, as the energy has it and at more points, (n, 3) each, and the sum of the sizes of the latter on its elements; the same of the couple about its center [N m]; its center (n, 3) [m]; and the distance of the nearest points [m]. Of its own elements that are near now but not at rest: the sums of the sizes of their forces, both ways, and the distance.
         """
     def own_field_on_moments(
         self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]

@@ -143,12 +143,18 @@ class OwnField {
         std::vector<Vec3> positions, forces, couples;
     };
     DipoleActions on_dipoles(const double* q) const;
-    /// The forces [N] on each body by elements of others that are near, as the energy has them and at more points; the sum of the sizes of
-    /// the latter on its elements [N], and the distance of the nearest points [m]. The same of its own elements that are near now but not
-    /// at rest: the sums of the sizes of their forces, and the distance.
-    struct GapForces {
+    /// The actions on each body by elements of others that are near: as the energy has them and better ones, and the sum of the sizes of the
+    /// latter on its elements.
+    struct GapActions {
         std::vector<Vec3> taken, finer;
-        std::vector<double> sizes, nearest;
+        std::vector<double> sizes;
+    };
+    /// The forces [N] and the couples [N m] about the center of each body [m], and the distance of the nearest points [m]. Of its own elements
+    /// that are near now but not at rest: the sums of the sizes of their forces [N], and the distance.
+    struct GapForces {
+        GapActions forces, couples;
+        std::vector<Vec3> centers;
+        std::vector<double> nearest;
         std::vector<double> taken_within, finer_within, nearest_within;
     };
     /// rest: positions of the nodes at rest, as q.

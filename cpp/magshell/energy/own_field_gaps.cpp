@@ -93,8 +93,8 @@ OwnField::GapForces OwnField::gap_forces(const double* q, const double* rest, co
                                          const std::vector<Index>& body_of_tetrahedron,
                                          Index n_bodies) const {
     const std::vector<double> none(n_bodies, 0.0), far(n_bodies, std::numeric_limits<double>::infinity());
-    const std::vector<Vec3> no_forces(n_bodies, Vec3::Zero());
-    GapForces found{no_forces, no_forces, none, far, none, none, far};
+    const std::vector<Vec3> zero(n_bodies, Vec3::Zero());
+    GapForces found{{zero, zero, none}, {zero, zero, none}, zero, far, none, none, far};
     const std::vector<Triple<double>> x = positions<double>(q, nullptr),
                                       at_rest = positions<double>(rest, nullptr);
     const Geometry<double> at(*this, x), before(*this, at_rest);
@@ -220,6 +220,19 @@ OwnField::GapForces OwnField::gap_forces(const double* q, const double* rest, co
                              (a.length < b.length ? mean_pull(first, second) : -mean_pull(second, first));
         }
     });
+    std::vector<Index> counts(n_bodies, 0);
+    for (const Element& element : elements_) {
+        found.centers[body_of(element)] += values_of(at.middle(element));
+        ++counts[body_of(element)];
+    }
+    for (Index body = 0; body < n_bodies; ++body)
+        found.centers[body] /= static_cast<double>(std::max<Index>(counts[body], 1));
+    // Where a force acts, from the center of its body: at the middle of an element or at the center of a face.
+    const auto arm_of = [&](Index source, Index body) {
+        const Vec3 place = source < n_elements ? values_of(at.middle(elements_[source]))
+                                               : values_of(at.center(faces_[source - n_elements]));
+        return Vec3(place - found.centers[body]);
+    };
     std::vector<Vec3> on_sources(elements_.size() + faces_.size(), Vec3::Zero());
     std::vector<Index> bodies(on_sources.size(), 0);
     for (const Push& push : pushes) {
@@ -234,14 +247,22 @@ OwnField::GapForces OwnField::gap_forces(const double* q, const double* rest, co
         for (int side = 0; side < 2; ++side) {
             const double sign = side == 0 ? 1.0 : -1.0;
             const Index body = push.bodies[side], source = push.sources[side];
-            found.taken[body] += sign * push.taken;
-            found.finer[body] += sign * push.finer;
+            const Vec3 arm = arm_of(source, body);
+            found.forces.taken[body] += sign * push.taken;
+            found.forces.finer[body] += sign * push.finer;
+            found.couples.taken[body] += sign * arm.cross(push.taken);
+            found.couples.finer[body] += sign * arm.cross(push.finer);
             found.nearest[body] = std::min(found.nearest[body], push.nearest);
             on_sources[source] += sign * push.finer;
             bodies[source] = body;
         }
     }
-    for (std::size_t k = 0; k < on_sources.size(); ++k) found.sizes[bodies[k]] += on_sources[k].norm();
+    for (std::size_t k = 0; k < on_sources.size(); ++k) {
+        if (on_sources[k] == Vec3::Zero()) continue;
+        const double size = on_sources[k].norm();
+        found.forces.sizes[bodies[k]] += size;
+        found.couples.sizes[bodies[k]] += size * arm_of(static_cast<Index>(k), bodies[k]).norm();
+    }
     return found;
 }
 

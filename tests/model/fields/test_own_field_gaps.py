@@ -78,6 +78,26 @@ def test_near_bodies_are_warned_of_where_their_force_is_off(first, second, sizes
         assert named == pytest.approx(error, rel=0.4)
 
 
+@pytest.mark.parametrize(("distance", "is_off"), [(1.05 * SIDE, True), (1.4 * SIDE, False)])
+def test_near_bodies_are_warned_of_where_their_couple_is_off(distance, is_off):
+    """Check a cube that is shifted along another, against the charges of its sides in the closed field of a magnet."""
+    along = np.array((2e-3, 3e-3, distance))
+    first, second = cube(0.0, 4), cube(distance, 4, along=(*along[:2], 0))
+    found, warned = result_and_warnings(lambda: ms.equilibrium(held(first, second), progress=False))
+    at, weights = np.polynomial.legendre.leggauss(24)
+    x, y, side = np.meshgrid(at, at, (-1.0, 1.0), indexing="ij")
+    arms = SIDE / 2 * np.stack([x, y, side], axis=-1).reshape(-1, 3)
+    charges = MAGNETIZATION[2] * (SIDE / 2) ** 2 * weights[:, None, None] * weights[:, None] * side
+    fields = ms.CuboidMagnet(CUBE, MAGNETIZATION).flux_density(arms + along)
+    exact = np.cross(arms, charges.reshape(-1, 1) * fields).sum(axis=0)
+    error = np.linalg.norm(found.magnetic_torque(second) - exact) / np.linalg.norm(exact)
+    assert (error > 0.02) == is_off and (is_off or error < 5e-3)
+    (named,) = [re.search(r"the couple .* is off by about ([\d.]+)%", each) for each in warned] or [None]
+    assert (named is not None) == is_off
+    if named:
+        assert float(named.group(1)) / 100 == pytest.approx(error, rel=0.4)
+
+
 @pytest.mark.parametrize(("gap", "is_wrong"), [(0.1 * THICKNESS, True), (3 * THICKNESS, False)])
 def test_parts_of_a_folded_sheet_are_warned_of_like_two_plates(gap, is_wrong):
     """Check a sheet that is folded flat, so that its outer parts are two plates that lie on each other."""
@@ -99,7 +119,7 @@ def test_parts_of_a_folded_sheet_are_warned_of_like_two_plates(gap, is_wrong):
     values = plain_inputs(scene, None, None, None).values
     state = scene._model.state(folded, np.zeros(scene._bodies.n_rotations))
     (found,) = gap_errors(values, state)
-    assert found.is_within and found.gap < 2 * (gap + THICKNESS)
+    assert found.action == "within" and found.gap < 2 * (gap + THICKNESS)
     assert (found.error > 0.05) == is_wrong and (is_wrong or found.error < 5e-3)
     _, warned = result_and_warnings(lambda: warn_of_gaps([found], "this state"))
     assert bool(warned) == is_wrong and all("between parts of Shell(" in each for each in warned)

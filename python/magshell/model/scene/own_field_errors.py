@@ -6,8 +6,9 @@ other,
 
     error = |sum F - sum F_finer| / max(|force of the own field on the body|, sum |F_finer| / 10),
 
-for each body, by all near elements of the others. The parts of one body, as of a folded strip, are compared where their
-elements are near now but not at rest: the error is that of the sum of |F|. Moments of rigid bodies are not compared.
+for each body, by all near elements of the others, and likewise the couples about its center. The parts of one body, as of a
+folded strip, are compared where their elements are near now but not at rest: the error is that of the sum of |F|. Moments of
+rigid bodies are not compared.
 """
 
 from __future__ import annotations
@@ -27,30 +28,32 @@ _COINCIDE = 1e-9  # [-] distance of two points, over the extent, below which the
 
 
 class GapError(NamedTuple):
-    """The relative error of the force on a body by others in its own field, and its distance from them [m].
+    """The relative error of what acts on a body by others in its own field, and its distance from them [m].
 
-    error: infinite where points of two bodies coincide. is_within: whether it is of the forces between parts of the body.
+    error: infinite where points of two bodies coincide. action: "force", "couple", or "within" for forces between parts of
+    the body.
     """
 
     body: Any
     error: float
     gap: float
-    is_within: bool
+    action: str
 
 
 def gap_errors(values: Values, state: np.ndarray) -> Iterator[GapError]:
-    """Yield the error of each body that is near others in the own field of a scene."""
+    """Yield the errors of each body that is near others in the own field of a scene."""
     scene = values.scene
     if scene.own_field is None or not np.isfinite(state).all():
         return
     with values.in_core():
-        owners, *arrays = scene._model.own_field_gap_forces(state)
-        taken, finer, sizes, gaps, taken_within, finer_within, gaps_within = arrays
+        owners, of_forces, of_couples, centers, gaps, *within = scene._model.own_field_gap_forces(state)
+        taken_within, finer_within, gaps_within = within
         if not np.isfinite([*gaps, *gaps_within]).any():
             return
         layout = scene._load_parameter_layout
         factor = layout.packed({("scene", "own_field_factor"): np.ones(1)}, layout.zeros())
         forces = -scene._model.positions(scene._model.term_gradient("own field", state, factor))
+        positions = scene._model.positions(state)
     objects = {label: each for each, label in scene._labels}
     for k, owner in enumerate(owners):
         body = objects[owner]
@@ -60,12 +63,17 @@ def gap_errors(values: Values, state: np.ndarray) -> Iterator[GapError]:
                 for n, each in enumerate(scene.bodies)
                 if each is body or getattr(each, "skin", None) is body
             )
-            total = np.linalg.norm(forces[scene._bodies.spans[number].vertices].sum(axis=0))
-            reference = max(float(total), CANCELLING * sizes[k])
-            yield GapError(body, _ratio(np.linalg.norm(taken[k] - finer[k]), reference), gaps[k], False)
+            vertices = scene._bodies.spans[number].vertices
+            couples = np.cross(positions[vertices] - centers[k], forces[vertices])
+            for action, (taken, finer, sizes), all_of_it in (
+                ("force", of_forces, forces[vertices]),
+                ("couple", of_couples, couples),
+            ):
+                reference = max(float(np.linalg.norm(all_of_it.sum(axis=0))), CANCELLING * sizes[k])
+                yield GapError(body, _ratio(np.linalg.norm(taken[k] - finer[k]), reference), gaps[k], action)
         if np.isfinite(gaps_within[k]):
             off = abs(taken_within[k] - finer_within[k])
-            yield GapError(body, _ratio(off, finer_within[k]), gaps_within[k], True)
+            yield GapError(body, _ratio(off, finer_within[k]), gaps_within[k], "within")
 
 
 def _ratio(off: Any, reference: float) -> float:
@@ -90,16 +98,16 @@ def describe_coincident_points(values: Values, state: np.ndarray) -> str:
 
 
 def warn_of_gaps(found: Iterable[GapError], where: str) -> None:
-    """Warn if the force of the own field on a body is off by more than 1 %."""
+    """Warn if the force or the couple of the own field on a body is off by more than 1 %."""
     worst = max(found, key=lambda each: each.error, default=None)
     if worst is None or not worst.error > TRUSTED:
         return
     by = f"by about {worst.error:.0%}" if worst.error < 1.0 else "entirely"
-    what, other = "force of the own field on", "another body"
-    if worst.is_within:
-        what, other = "forces of the own field between parts of", "one of them"
+    is_within = worst.action == "within"
+    what = "forces of the own field between parts of" if is_within else f"{worst.action} of the own field on"
     warn_of_forces(
-        f"{where}: the {what} {worst.body!r} {'are' if worst.is_within else 'is'} off {by}, as {other} is about "
-        f"{worst.gap:.2g} m away, much less than its edges are long, or passes through it. Take a finer mesh there, with "
-        "edges of at most four times the gap, or keep them apart by a contact"
+        f"{where}: the {what} {worst.body!r} {'are' if is_within else 'is'} off {by}, as "
+        f"{'one of them' if is_within else 'another body'} is about {worst.gap:.2g} m away, much less than its edges are "
+        "long, or passes through it. Take a finer mesh there, with edges of at most four times the gap, or keep them apart "
+        "by a contact"
     )
