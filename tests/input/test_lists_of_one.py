@@ -173,6 +173,20 @@ def test_selections_are_arrays_otherwise() -> None:
     assert ms.Pin(np.setdiff1d(vertices, vertices[:1])).vertices.tolist() == plain[1:].tolist()
     assert ms.Clamp(MESH.edges_between(vertices)).edges.tolist() == edges.tolist()
     assert ms.Clamp(np.array(vertices)).edges.tolist() == plain.tolist()  # a plain array may be anything
+    other = MESH.vertices_at(y=0.0)
+    for joined in (
+        np.concatenate([vertices, other]),
+        np.union1d(vertices, other),
+        np.append(vertices, other),
+    ):
+        with pytest.raises(ValueError, match="Clamp edges were given as vertices"):
+            ms.Clamp(joined)
+    for made in (
+        np.concatenate([vertices, edges]),
+        np.concatenate([vertices, [3]]),
+        np.stack([vertices] * 2),
+    ):
+        assert type(made) is np.ndarray
     again = pickle.loads(pickle.dumps(vertices))
     assert again.tolist() == plain.tolist() and isinstance(again, np.ndarray)
     with pytest.raises(

@@ -18,8 +18,8 @@ _OTHERWISE = {
 class Indices(np.ndarray):
     """An integer array that knows which entities it counts, so that vertex indices passed as edges raise an error.
 
-    Slices keep the kind; results of arithmetic are plain arrays. kind: one of KINDS. total: how many there are in the mesh
-    on which they were selected, None if not known.
+    Slices, and selections that are joined (np.concatenate, np.union1d), keep the kind; results of arithmetic are plain
+    arrays. kind: one of KINDS. total: how many there are in the mesh on which they were selected, None if not known.
     """
 
     kind: str | None
@@ -41,6 +41,17 @@ class Indices(np.ndarray):
         if "out" in options:
             options["out"] = tuple(map(plain, options["out"]))
         return getattr(ufunc, method)(*map(plain, inputs), **options)
+
+    def __array_function__(self, function, types, args, options):
+        made = super().__array_function__(function, types, args, options)
+        if function is not np.concatenate or "out" in options:
+            return made
+        # Other functions that join arrays do so by np.concatenate.
+        joined = [each for each in args[0] if isinstance(each, Indices)]
+        kinds, totals = {each.kind for each in joined}, {each.total for each in joined}
+        if len(joined) < len(args[0]) or len(kinds) > 1 or made.dtype == bool:
+            return made
+        return Indices(made, *kinds, totals.pop() if len(totals) == 1 else None)
 
     def __repr__(self) -> str:
         return repr(self.view(np.ndarray))

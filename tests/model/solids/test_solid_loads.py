@@ -181,6 +181,7 @@ def test_faces_selected_on_the_mesh_of_four_node_tetrahedra_are_refused_on_a_qua
         lambda mesh: mesh.faces_where(lambda x: x[:, 0] > 0.19),
         lambda mesh: mesh.faces_between(mesh.vertices_at(x=0.2)),
         lambda mesh: mesh.faces_at(x=0.2)[::-1],
+        lambda mesh: np.concatenate([mesh.faces_at(x=0.2), mesh.faces_at(y=0.0)]),
     )
     for select in selections:
         with pytest.raises(
