@@ -53,9 +53,9 @@ namespace {
 // Iteration from which on steps must shrink; see test_a_thin_strip_rolled_up.
 constexpr int settling_iterations = 6;
 
-// [-] Least tolerance of linear solves whose products are nearly exact: an iteration with exact products takes longer than two with these.
-// See test_newton_converges_alike_by_rough_products.
-constexpr double least_by_rough_products = 1e-4;
+// [-] Least tolerance of linear solves whose products are nearly exact: an iteration with exact products takes longer than two with these. What
+// is left of a step of the size of the bodies is settled then. See test_newton_converges_alike_by_rough_products.
+constexpr double least_by_rough_products = settled_part;
 
 // Returns the tolerance of the linear solve with a nonsymmetric matrix (inexact Newton, N&W 7.1): the forcing term that keeps quadratic
 // convergence, and no less than `least` and than the tolerance of the residual needs.
