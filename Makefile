@@ -19,7 +19,7 @@ pythons := $(wildcard python benchmarks tests examples docs scripts)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick seconds docs gallery wheel sanitize processors lint format stubs clean
+.PHONY: help demo test room nightly change seconds docs gallery wheel sanitize processors lint format stubs clean
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -30,13 +30,22 @@ demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pict
 	$(VENV)/bin/python examples/bistable_beam.py
 	@echo "The pictures are in $(CURDIR)/out:" && ls out
 
-test: $(VENV)/.with-test  ## every test, the notebooks and examples included
-	$(PYTEST)
+test: $(VENV)/.with-test  ## the tests of a change, of every room: six minutes on two processors
+	$(PYTEST) -m "not nightly"
 
-quick: $(VENV)/.with-test  ## the tests that take little time: under two minutes on two processors
-	$(PYTEST) -m "not slow" --durations=10 --durations-min=1
+room: $(VENV)/.with-test  ## the tests of a room and those that use it, as in make room ROOM=contact: a minute
+	files=$$($(VENV)/bin/python scripts/tests_of.py room $(ROOM)) && $(PYTEST) -m "not nightly" $$files
 
-seconds: $(VENV)/.with-test  ## measure again which tests take long, for `make quick`: every test
+# Hypothesis searches at random here; SEED=... repeats a search.
+nightly: $(VENV)/.with-test  ## all other tests, and a search at random: a quarter of an hour
+	scripts/nightly_tools.sh
+	seed=$${SEED:-$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')} && echo "make nightly SEED=$$seed repeats the search." && \
+	    MAGSHELL_SEARCH=1 $(PYTEST) -m "nightly or hypothesis" --hypothesis-seed=$$seed
+
+change: $(VENV)/.with-test  ## the nightly tests of the rooms that changed since BASE, and of those above them: ten minutes
+	files=$$($(VENV)/bin/python scripts/tests_of.py change $(BASE)) && { [ -z "$$files" ] || $(PYTEST) -m nightly $$files; }
+
+seconds: $(VENV)/.with-test  ## measure again which tests take long, and so are nightly: every test
 	$(PYTEST) --junitxml=build/tests.xml
 	$(VENV)/bin/python scripts/test_seconds.py build/tests.xml tests/seconds.txt
 

@@ -1,5 +1,5 @@
-"""Writes the processor time of the slow tests from a report of pytest: one line for each test function, parameters
-together and with the fixtures that it shares. The tests that are not listed take BUDGET seconds in sum.
+"""Writes the processor time of tests from a report of pytest: one line for each test function that takes LISTED or more,
+parameters together and with the fixtures that it shares. The longest are nightly, so many that all others take BUDGET.
 
 `make seconds` runs it:
 
@@ -12,12 +12,14 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter, defaultdict
 from pathlib import Path
 
-BUDGET = 120.0  # [s] of the processor for all quick tests together; collecting them and pytest itself take some 50 s more
+BUDGET = 540.0  # s of the processor for the tests of `make test`; collecting them and pytest itself take some 100 s more
+LISTED = 0.2  # s
+# Tests of `make test` whatever they take, as nothing else there guards the same lines.
+KEPT: set[str] = set()
 HEADER = """\
-# Tests that took longest, all parameters together: seconds of the processor with the fixtures that they share, file::test.
-# All others took {:.0f} s in sum.
-# `make quick` leaves these out, and several processes begin with the files that take longest. Written by `make seconds`;
-# a test that is not here is quick.
+# Tests that took longest, all parameters together: seconds of the processor with the fixtures that they share, file::test,
+# and whether it is nightly. The others took {:.0f} s in sum, with those that are too quick to be listed.
+# Several processes begin with the files that take longest. Written by `make seconds`; a test that is not here is quick.
 """
 
 
@@ -50,24 +52,29 @@ def seconds_of(report: Path) -> dict[str, Test]:
     return tests
 
 
-def slow_tests(tests: dict[str, Test], budget: float) -> list[str]:
+def nightly_tests(tests: dict[str, Test], budget: float) -> list[str]:
     """Return the names of the longest tests, in alphabetical order, without which the rest take at most `budget`.
 
     A shared fixture counts once for all the rest that use it.
     """
     users = Counter(key for test in tests.values() for key in test.shared)
     fixtures = {key: seconds for test in tests.values() for key, seconds in test.shared.items()}
-    left, slow = sum(test.own for test in tests.values()) + sum(fixtures.values()), []
-    for name in sorted(tests, key=lambda name: (-tests[name].seconds, name)):
+    left, nightly = sum(test.own for test in tests.values()) + sum(fixtures.values()), []
+    for name in sorted(tests.keys() - KEPT, key=lambda name: (-tests[name].seconds, name)):
         if left <= budget:
             break
-        slow.append(name)
+        nightly.append(name)
         users.subtract(list(tests[name].shared))
         left -= tests[name].own + sum(fixtures[key] for key in tests[name].shared if not users[key])
-    return sorted(slow)
+    return sorted(nightly)
 
 
 if __name__ == "__main__":
     found = seconds_of(Path(sys.argv[1]))
-    lines = "".join(f"{found[name].seconds:.2f} {name}\n" for name in slow_tests(found, BUDGET))
+    nightly = set(nightly_tests(found, BUDGET))
+    lines = "".join(
+        f"{found[name].seconds:.2f} {name}{' nightly' if name in nightly else ''}\n"
+        for name in sorted(found)
+        if found[name].seconds >= LISTED or name in nightly
+    )
     Path(sys.argv[2]).write_text(HEADER.format(BUDGET) + lines)

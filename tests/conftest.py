@@ -1,5 +1,8 @@
 """Common conditions of all tests: one BLAS thread, two threads of magshell (one where tests run in several
 processes), no display, the same random numbers every time.
+
+Hypothesis takes the same examples every time. With MAGSHELL_SEARCH=1, as in `make nightly`, it searches at random, more
+of them; pytest's --hypothesis-seed repeats a search.
 """
 
 import os
@@ -21,17 +24,22 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
+from hypothesis import HealthCheck, settings  # noqa: E402
 from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
     pytest_collection_modifyitems,
-    pytest_configure_node,
     pytest_fixture_setup,
-    pytest_runtest_protocol,
     pytest_runtest_setup,
     pytest_runtest_teardown,
     pytest_xdist_auto_num_workers,
 )
 
 from magshell._runtime.broken_pipes import ignore_broken_pipes  # noqa: E402
+
+# Neither looks at a clock, nor remembers what failed before.
+UNTIMED = {"deadline": None, "database": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("same", derandomize=True, **UNTIMED)
+settings.register_profile("search", print_blob=True, **UNTIMED)
+settings.load_profile("search" if os.environ.get("MAGSHELL_SEARCH") == "1" else "same")
 
 
 def pytest_report_header() -> str | None:

@@ -164,6 +164,7 @@ def test_baselines_beside_ours_at_ten_times_the_simulations(ours, theirs, goal, 
     assert compare_with_ours("L-BFGS", task) == "ours"
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_quick_run_draws_a_figure(tmp_path, capsys) -> None:
     pytest.importorskip("cma")
     pytest.importorskip("matplotlib")
@@ -181,6 +182,7 @@ def test_quick_run_draws_a_figure(tmp_path, capsys) -> None:
     assert is_a_picture(picture)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_runs_are_kept_and_gone_on_with(tmp_path, capsys, monkeypatch) -> None:
     """Stop in the second run: the first is printed; later only the missing ones are run, with the same numbers."""
     chosen = ["experiments", "--budget", "4", "--only", "suspension", "--methods", "L-BFGS", "--seeds", "2"]
@@ -240,6 +242,7 @@ def test_memory_in_processes_of_their_own(capsys) -> None:
     assert "checkpoints" in capsys.readouterr().out
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_library_that_is_not_there_is_a_row(monkeypatch, capsys) -> None:
     monkeypatch.setitem(sys.modules, "cma", None)
     chosen = ["--only", "suspension", "--methods", "CMA-ES", "MMA"]

@@ -1,4 +1,4 @@
-"""Tests of how the benchmarks measure times. They stand apart from the tests that take long, as some have to run alone."""
+"""Tests of how the benchmarks measure times."""
 
 import time
 
@@ -15,7 +15,6 @@ def same_threads_afterwards():
     ms.set_num_threads(before)
 
 
-@pytest.mark.alone
 @pytest.mark.parametrize("long", [True, False])
 def test_a_long_call_is_measured_in_one_round(monkeypatch, long: bool) -> None:
     calls = []
@@ -25,7 +24,6 @@ def test_a_long_call_is_measured_in_one_round(monkeypatch, long: bool) -> None:
     assert measured.wall >= 2e-3 and 0 <= measured.processor < measured.wall
 
 
-@pytest.mark.alone
 def test_share_of_the_processor() -> None:
     ms.set_num_threads(1)
     slept, share = timing.with_processor_fraction(lambda: time.sleep(0.05))

@@ -5,6 +5,8 @@ import pytest
 
 import magshell as ms
 
+pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
+
 INTEGRATORS = [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()]
 GAINS = 2e-3  # [-] largest relative gain that round-off and the time integration error may cause
 

@@ -181,6 +181,7 @@ def deformed(problem, rng):
     return np.concatenate([positions.ravel(), rotations]), problem.model.state(positions, rotations)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @pytest.mark.parametrize("bending", ["midedge", "hinge"])
 @pytest.mark.parametrize("dominant_term", CARRIERS)
 def test_energies_gradients_and_hessians_agree_with_torch(dominant_term, bending, rng):

@@ -70,7 +70,7 @@ def free_sheet(mesh, bending):
 
 
 @pytest.mark.parametrize("bending", BENDINGS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(rotation=rotations, shift=st.tuples(*[st.floats(-1, 1)] * 3))
 def test_elastic_energy_is_invariant_under_rigid_motions(bending, rotation, shift):
     problem = free_sheet(strip(), bending)
@@ -87,7 +87,7 @@ def test_elastic_energy_is_invariant_under_rigid_motions(bending, rotation, shif
 
 
 @pytest.mark.parametrize("bending", BENDINGS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(rotation=rotations, shift=st.tuples(*[st.floats(-0.3, 0.3)] * 3))
 def test_rotating_the_scene_rotates_the_equilibrium(bending, rotation, shift):
     mesh = strip()

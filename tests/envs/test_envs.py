@@ -99,6 +99,7 @@ def test_a_support_moves_in_straight_lines():
     np.testing.assert_allclose(seen[1:, 5], [0.2, 0.0, -0.4], atol=1e-9)  # m/s
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_seeds_reproduce_bits_and_differ():
     one = robots.magnetic_strip()
     actions = np.random.default_rng(0).uniform(-1, 1, (6, 3))
@@ -116,6 +117,7 @@ def test_an_episode_is_truncated_and_finished():
     assert ends == [(False, False), (False, False), (True, False), (True, False), (True, True)]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_options_of_reset_come_first():
     one = robots.magnetic_strip()
     rest = one.scene.mesh.rest_positions

@@ -79,6 +79,7 @@ def assert_close(found, expected, fraction):
     assert np.abs(found - expected).max() < fraction * np.abs(expected).max()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_gradients_by_all_actions_match_differences(robot):
     environment = ROBOTS[robot]()
@@ -115,6 +116,7 @@ def test_gradients_by_the_velocities_of_the_start_match_differences(integrator):
     assert abs(found - expected) < 1e-5 * abs(expected)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("robot", ["strip", "on a floor"])
 def test_differentiable_steps_have_the_bits_of_steps(robot):
     environment, other = ROBOTS[robot](), ROBOTS[robot]()
@@ -154,6 +156,7 @@ def test_rewards_of_the_state_before_have_gradients_too():
     assert_close(given.grad.numpy(), differences(last_reward, actions, 1e-4), 1e-5)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_detached_state_ends_gradients():
     environment = robots.magnetic_strip()
     environment.reset(seed=1)
@@ -203,6 +206,7 @@ def test_entries_with_equal_bounds_are_fixed():
         assert along.value(number, 0.0, None).tolist() == [1e-3, 0.0, -4e-3 + 0.5 * 1.3 * 6e-3]
 
 
+@pytest.mark.filterwarnings("ignore:Converting a tensor with requires_grad=True to a scalar:UserWarning")
 def test_functions_that_leave_torch_are_refused():
     for reward in (
         lambda now: float(now.positions[-1, 2]),

@@ -31,6 +31,7 @@ def same(found, expected) -> None:
         assert one.seed == other.seed and one.failure is None
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_episodes_equal_single_steps(alone):
     actions, found = alone
     assert [len(each.rewards) for each in found] == [3, 3, 50]  # as many as there are; as an episode lasts
@@ -42,6 +43,7 @@ def test_episodes_equal_single_steps(alone):
     assert found[1].reward == pytest.approx(sum(reward for _, reward in rows), abs=1e-15)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_whole_episodes_in_processes_have_the_same_bits(alone):
     actions, expected = alone
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
@@ -64,6 +66,7 @@ def fails_to_be_made():
     raise RuntimeError("no such robot")
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_an_episode_that_fails_says_so(alone):
     with ThreadPoolExecutor(1) as executor, pytest.raises(RuntimeError, match="no such robot"):
         ms.envs.episodes(fails_to_be_made, [squeezed], executor=executor)

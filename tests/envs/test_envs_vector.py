@@ -47,6 +47,7 @@ def assert_same(one, other):
                 np.testing.assert_array_equal(ours[4][name], theirs[4][name])
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @pytest.mark.parametrize("made_by", ["copies", "function"])
 def test_members_have_the_bits_of_gymnasiums_own_vector(mode, made_by):

@@ -21,6 +21,7 @@ def test_the_search_closes_the_arms(result, example) -> None:
     assert np.abs(design["remanent_magnetization"]).max() <= example.LIMIT
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_six_printable_directions_meet_the_target(example, result) -> None:
     """Check that the rounded design, every face fully magnetized along an axis, is within 0.3 mm of the target."""
     printed = result["printed"]

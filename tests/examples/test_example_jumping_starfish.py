@@ -86,6 +86,7 @@ def test_linear_elements_are_too_stiff(result) -> None:
     assert result["again"]["rms_distance"] < result["converged"]["rms_distance"]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_the_gradient_of_the_whole_motion_is_that_of_differences(parts, element) -> None:
     """Compare along one direction of the unknowns, through contact, friction and take-off."""
@@ -111,6 +112,7 @@ def test_the_gradient_of_the_whole_motion_is_that_of_differences(parts, element)
     assert slope == pytest.approx((up - down) / (2 * step), rel=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_pictures_and_summary(example, result, tmp_path) -> None:
     example.plot({"heavy": result}).savefig(tmp_path / "starfish.png")
     assert (tmp_path / "starfish.png").stat().st_size > 50_000

@@ -64,6 +64,7 @@ def test_little_is_left_to_gain(tower) -> None:
     assert gap["tower"] < 0.05 * gap["start"]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_pictures_and_summary(tower, tmp_path) -> None:
     example = load("kirigami_tower")
     example.plot(tower).savefig(tmp_path / "tower.png")

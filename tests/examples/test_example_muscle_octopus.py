@@ -80,6 +80,7 @@ def test_the_environment_moves_as_the_motion_does(swum) -> None:
     assert sum(rewards) == pytest.approx(1 - octopus.relative_distance(motion), abs=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_pictures_of_the_octopus(swum, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("MAGSHELL_PLOT", "matplotlib")
     example = load("muscle_octopus")

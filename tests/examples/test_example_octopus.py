@@ -71,6 +71,7 @@ def test_the_gradient_is_that_of_differences(example) -> None:
         assert field.grad[index].item() == pytest.approx(slope, rel=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_picture_and_summary(example, swim, tmp_path) -> None:
     figure = example.plot({"pipe I": swim})
     figure.savefig(tmp_path / "octopus.png")

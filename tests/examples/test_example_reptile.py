@@ -61,6 +61,7 @@ def test_penetration_into_the_ground_stays_below_0_1_mm(result) -> None:
         assert -0.1e-3 < depth < 0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_without_friction_it_stays_where_it_is(parts, result) -> None:
     model, study = parts
     slippery = model.crawler(model.flat(), friction_coefficient=0.0)
@@ -69,6 +70,7 @@ def test_without_friction_it_stays_where_it_is(parts, result) -> None:
     assert abs(study.advances(slippery, motion)[0, 0]) < 0.03 * ahead
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_pictures_and_summary(example, result, tmp_path) -> None:
     example.plot(result).savefig(tmp_path / "reptile.png")
     example.animation(result, "slope", tmp_path / "slope.gif", fps=2, speed=0.1)

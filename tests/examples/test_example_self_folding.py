@@ -31,6 +31,7 @@ def test_a_field_upwards_opens_the_fold(result) -> None:
     assert own["angles"][-1] == pytest.approx(without["angles"][-1], abs=2)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_picture_and_summary(example, result, tmp_path) -> None:
     example.plot(result).savefig(tmp_path / "fold.png")
     assert (tmp_path / "fold.png").stat().st_size > 50_000

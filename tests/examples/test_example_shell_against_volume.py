@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from example_modules import load
 
+pytestmark = pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
+
 
 @pytest.fixture(scope="module")
 def result() -> dict:

@@ -63,6 +63,7 @@ def test_dilated_design_lifts_too(result) -> None:
     assert forms["intermediate"] == pytest.approx(_sums(result)["both"], rel=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_search_goes_on_from_a_coarse_design_on_a_finer_mesh(result) -> None:
     coarse, fine = example.Arm((24, 12)), example.Arm((32, 16))
     start = example.on_finer_mesh(coarse, result["designs"]["both"], fine)
@@ -73,6 +74,7 @@ def test_search_goes_on_from_a_coarse_design_on_a_finer_mesh(result) -> None:
     assert 1e3 * found["heights"].sum() > 20.0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_search_goes_on_from_mesh_to_finer_mesh(result) -> None:
     """Check that the design of each mesh starts the search on the next."""
     both = result["designs"]["both"]
@@ -82,6 +84,7 @@ def test_search_goes_on_from_mesh_to_finer_mesh(result) -> None:
     assert 1e3 * fine["heights"].sum() > 20.0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_topology_pictures_are_written(result, tmp_path) -> None:
     example.write(result, tmp_path)
     assert {path.name for path in tmp_path.glob("*.png")} == {"topology.png", "topology_arm.png"}

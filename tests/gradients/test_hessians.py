@@ -100,6 +100,7 @@ def test_pressures_without_potential_refuse_hessians(name):
         torch.autograd.grad(first, inputs, [torch.ones_like(each) for each in inputs])
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_hessians_of_a_fine_sheet_are_not_lost_to_round_off():
     """Check that products with a Hessian are symmetric and those of differences, from no magnetization."""
     mesh = ms.meshes.rectangle(0.04, 0.01, cells=(48, 12))

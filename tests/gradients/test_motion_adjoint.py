@@ -127,6 +127,7 @@ def motion_and_gradient(steps, **options):
     return move, field, tensor.grad.numpy()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_over_200_steps_against_differences():
     _, field, gradient = motion_and_gradient(200)
     rng = np.random.default_rng(2)
@@ -215,6 +216,7 @@ def test_kept_factors_share_their_work_space():
     assert move.bytes < 0.8 * 3 * one.bytes
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_step_in_parts_has_its_gradient():
     """Use a jump of the field that one step cannot take."""
     scene = a_strip()
@@ -244,6 +246,7 @@ def test_a_step_in_parts_has_its_gradient():
     np.testing.assert_allclose(float(tensor.grad.sum()), difference, rtol=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_no_gradient_of_a_motion_that_stopped():
     scene = a_strip()
     magnetization = torch.tensor([3e4, 0.0, 0.0], dtype=torch.float64, requires_grad=True)

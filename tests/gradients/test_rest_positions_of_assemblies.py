@@ -152,6 +152,7 @@ def test_gradient_by_rest_positions_of_tied_sheets_moves_welded_vertices_togethe
         ms.equilibrium(scene, values={lower: {"rest_positions": X}}, **GIVEN)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_a_mesh_that_rest_positions_lead_through_itself_is_refused_by_its_contact():
     of = kind("a sheet on itself")
     body = of.scene.bodies[0]
@@ -280,6 +281,7 @@ def test_gradient_by_rest_positions_of_a_limit_point_agrees_with_differences_of_
     compare(limit, start, step=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=["euler", "tr_bdf2"])
 def test_gradient_by_rest_positions_of_a_muscle_that_shortens_fast_agrees_with_differences(

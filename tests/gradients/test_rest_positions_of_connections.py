@@ -215,6 +215,7 @@ def test_gradient_by_rest_positions_through_default_lengths_of_tendons_and_sprin
     check(scene, [body], X)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("center", [None, (0.08, 0.03, 0.004)], ids=["mean", "given"])
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=["euler", "tr_bdf2"])
 def test_gradient_by_rest_positions_of_a_moving_sheet_with_a_rigid_body_agrees_with_differences(

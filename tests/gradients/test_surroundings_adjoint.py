@@ -273,6 +273,7 @@ def dragged_over_ground(rotation=None):
     return ms.Scene(sheet, supports=[clamp], contacts=[contact]), clamp, contact
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
 @pytest.mark.parametrize("name", ["displacement", "rotation"])
 def test_by_a_support_that_presses_the_sheet_onto_the_ground(integrator, name):
@@ -323,6 +324,7 @@ def test_with_nodes_that_have_frames_of_their_own(integrator, what):
     assert found.energies["contact"].max() > 0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("name", ["friction_coefficient", "velocities"])
 def test_through_steps_that_are_taken_in_parts(name):
     """Check steps that are subdivided because in one step the sheet would pass the wall.

@@ -157,6 +157,7 @@ def test_a_ball_on_a_sheet_of_another_fineness(ball_cells, sheet_cells):
     assert touched >= 3 and motion[floor].positions[-1][:, 2].min() < -1e-3
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @pytest.mark.parametrize("law", ["barrier", "penalty"])
 def test_sheets_pressed_together_by_a_thousand_times_their_weight(law):
     lower, upper = sheet(0.02, 4), sheet(0.02, 4, (1e-3, 5e-4, 1.11e-3))
@@ -259,6 +260,7 @@ def test_blocked_contact_names_the_faces_in_the_way():
     assert_nothing_passes(scene, told.value.last_good)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
 def test_contact_that_opens_and_closes_in_every_step(integrator):
     """Check a plate that hammers on a block: down in one step, up in the next."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
@@ -11,7 +11,7 @@ import magshell as ms
 BENDINGS = st.sampled_from(["midedge", "hinge"])
 SEEDS = st.integers(0, 10_000)
 TIGHT = ms.MixedNewton(tolerance=1e-13)
-some = settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+some = settings(max_examples=12)
 
 
 def random_mesh(seed: int) -> ms.TriangleMesh:
@@ -91,6 +91,7 @@ def test_the_response_is_the_limit_of_small_loads(seed, bending):
     assert off[1] < 0.15 * off[0] + 1e-7 * np.abs(linear).max()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 @some
 @given(
     seed=SEEDS,
@@ -114,6 +115,7 @@ def test_an_affine_boundary_makes_an_affine_sheet(seed, ratio, gradient):
     assert np.abs(found.positions - deformed).max() < 1e-8
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @some
 @given(seed=SEEDS, exponent=st.integers(-6, 6))
 def test_solution_depends_on_the_product_of_magnetization_and_field(seed, exponent):
@@ -164,6 +166,7 @@ def test_the_order_of_a_scenes_parts_does_not_matter(seed, order):
 # Motions
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @some
 @given(seed=SEEDS, bending=BENDINGS, speed=st.tuples(*[st.floats(-3, 3)] * 3))
 def test_motion_of_a_free_body_is_the_same_in_every_inertial_frame(seed, bending, speed):
@@ -271,6 +274,7 @@ def test_a_motion_run_backwards_comes_back_as_steps_get_shorter(seed, bending):
     assert fine < 0.02 and fine < 0.5 * coarse + 1e-4
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @some
 @given(
     seed=SEEDS,

@@ -7,6 +7,7 @@ from soft_solids import thick_tube, ventricle
 import magshell as ms
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_apex_of_the_ventricle_goes_where_others_have_found_it():
     """Compare with -26.6 mm, about which the results in Land et al. 2015 lie, on a coarse mesh."""
     scene = ventricle(4, 1)

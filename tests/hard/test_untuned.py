@@ -36,6 +36,7 @@ def test_five_scenes_of_each_family_are_counted():
     assert len(list(counted())) == 5 * len(FAMILIES)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning", "ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("family", FAMILIES)
 def test_fastest_scene_of_a_family_is_right(family):
     name = f"{family}/{COUNTED[family][0]:02d}"

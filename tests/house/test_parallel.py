@@ -1,4 +1,4 @@
-"""Test runs in several processes: a test that is marked `alone` has the machine to itself."""
+"""Which tests are nightly, by the seconds of the processor that they take."""
 
 import importlib.util
 import shutil
@@ -10,18 +10,11 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parents[1]
-BUSY = """
-import time
-from pathlib import Path
+SPUN = """
 import pytest
 
 @pytest.mark.parametrize("k", range(8))
-{mark}
-def test_sleeps(k):
-    began = time.monotonic()
-    time.sleep(0.05)
-    with open("times.txt", "a") as file:
-        print("{mark}", began, time.monotonic(), file=file)
+def test_spins(k): pass
 """
 
 
@@ -31,7 +24,7 @@ def folder(tmp_path):
     (tmp_path / "support").mkdir()
     for name in ("conftest.py", "support/parallel.py"):
         shutil.copy(HERE / name, tmp_path / name)
-    options = "pythonpath = support\nmarkers =\n    alone: as here\n    slow: as here\n"
+    options = "pythonpath = support\nmarkers =\n    nightly: as here\n"
     (tmp_path / "pytest.ini").write_text(f"[pytest]\n{options}")
     return tmp_path
 
@@ -50,21 +43,6 @@ def run(folder, *options):
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="needs flock")
-@pytest.mark.skipif(importlib.util.find_spec("xdist") is None, reason="needs pytest-xdist")
-def test_processes_wait_while_a_marked_test_runs_alone(folder):
-    for number in range(3):
-        (folder / f"test_busy_{number}.py").write_text(BUSY.format(mark=""))
-    (folder / "test_alone.py").write_text(BUSY.format(mark="@pytest.mark.alone"))
-    run(folder, "-n", "3", "--dist", "loadfile")
-    lines = [line.split() for line in (folder / "times.txt").read_text().splitlines()]
-    alone = [(float(a), float(b)) for mark, a, b in (x for x in lines if len(x) == 3)]
-    others = [(float(a), float(b)) for a, b in (x for x in lines if len(x) == 2)]
-    assert len(alone) == 8 and len(others) == 24
-    assert all(end <= a or b <= began for began, end in alone for a, b in others)
-    assert any(a < d < b for a, b in others for _, d in others)  # the others did run at the same time
 
 
 def test_seconds_of_the_processor_count_all_parameters_and_fixtures(folder):
@@ -102,27 +80,27 @@ def test_seconds_of_the_processor_count_all_parameters_and_fixtures(folder):
     assert [0.25 < value < 1.0 for name, value in later.shared.items() if name.endswith("::dear")] == [True]
 
 
-def test_longest_tests_are_slow_until_the_rest_fit_into_the_budget():
-    slow_tests, tests = script().slow_tests, {}
+def test_longest_tests_are_nightly_until_the_rest_fit_into_the_budget():
+    nightly_tests, tests = script().nightly_tests, {}
     for name, own in {"a": 3.0, "b": 40.0, "c": 2.0, "d": 30.0}.items():
         tests[name] = script().Test()
         tests[name].own = own
-    assert slow_tests(tests, 75.0) == []
-    assert slow_tests(tests, 35.0) == ["b"]
-    assert slow_tests(tests, 34.0) == ["b", "d"]
-    assert slow_tests(tests, 0.0) == ["a", "b", "c", "d"]
+    assert nightly_tests(tests, 75.0) == []
+    assert nightly_tests(tests, 35.0) == ["b"]
+    assert nightly_tests(tests, 34.0) == ["b", "d"]
+    assert nightly_tests(tests, 0.0) == ["a", "b", "c", "d"]
     tests["a"].shared = tests["c"].shared = {"shared fixture": 20.0}
-    assert slow_tests(tests, 95.0) == []  # it counts once
-    assert slow_tests(tests, 54.0) == ["b", "d"]  # a takes 23, and leaving it out alone saves 3
-    assert slow_tests(tests, 24.0) == ["a", "b", "d"]
-    assert slow_tests(tests, 5.0) == ["a", "b", "c", "d"]
+    assert nightly_tests(tests, 95.0) == []  # it counts once
+    assert nightly_tests(tests, 54.0) == ["b", "d"]  # a takes 23, and leaving it out alone saves 3
+    assert nightly_tests(tests, 24.0) == ["a", "b", "d"]
+    assert nightly_tests(tests, 5.0) == ["a", "b", "c", "d"]
 
 
-def test_tests_listed_with_their_seconds_are_slow_with_all_their_parameters(folder):
-    (folder / "test_busy.py").write_text(BUSY.format(mark=""))
-    (folder / "test_other.py").write_text("def test_quick(): pass\n")
+def test_listed_tests_are_nightly_with_all_their_parameters(folder):
+    (folder / "test_busy.py").write_text(SPUN)
+    (folder / "test_other.py").write_text("def test_quick(): pass\ndef test_listed(): pass\n")
     (folder / "seconds.txt").write_text(
-        "# seconds, test\n3.5 test_busy.py::test_sleeps\n1.0 test_gone.py::test_gone\n"
+        "# seconds, test\n3.5 test_busy.py::test_spins nightly\n0.5 test_other.py::test_listed\n1.0 test_gone.py::test_gone nightly\n"
     )
-    assert "8 passed, 1 deselected" in run(folder, "-m", "slow")
-    assert "1 passed, 8 deselected" in run(folder, "-m", "not slow")
+    assert "8 passed, 2 deselected" in run(folder, "-m", "nightly")
+    assert "2 passed, 8 deselected" in run(folder, "-m", "not nightly")

@@ -36,7 +36,7 @@ def test_connectivity_of_two_faces_by_hand():
     assert [loop.tolist() for loop in mesh.boundary_loops] == [[0, 1, 2, 3]]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.integers(1, 6),
     st.integers(1, 6),
@@ -347,7 +347,7 @@ def test_flipped_mesh_has_opposite_normals():
     assert np.array_equal(flipped.edge_faces, mesh.edge_faces[:, ::-1])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_rigid_motions_keep_lengths_and_carry_normals(seed):
     random = np.random.default_rng(seed)

@@ -88,7 +88,7 @@ def test_alternating_is_its_own_mirror_image():
     assert rows == {tuple(row) for row in np.round(mirrored, 9)}
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.integers(1, 9),
     st.integers(1, 9),

@@ -17,6 +17,7 @@ def strip(n: int) -> ms.TriangleMesh:
     return ms.meshes.cylinder(1.0, 1.0, angle=1.0, cells=(n, n))
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("fine, error", [(4, 1e-3), (8, 1e-5), (32, 1e-8)])
 def test_the_finer_the_nearer(fine, error):
     """Measure border and interior; straight elements are 8e-3 off."""
@@ -60,6 +61,7 @@ def test_close_parallel_sheets_are_distinguished():
     assert on_cylinder(ms.QuadraticTriangleMesh.from_triangles(strip(4), surface=both)) < 1e-5
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_the_roof_on_a_fitted_mesh():
     """Compare case B1 with the mesh on the cylinder itself; straight elements are far off."""
     size = linear_cylinders.ROOF_RADIUS, linear_cylinders.ROOF_LENGTH / 2
@@ -78,6 +80,7 @@ def test_the_roof_on_a_fitted_mesh():
     assert abs(sinks(ms.QuadraticTriangleMesh.from_triangles(flat)) / exact - 1.0) > 1e-3
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_unsuitable_meshes_are_refused():
     with pytest.raises(ValueError, match="surface folds by 45 degrees at its edge"):
         ms.QuadraticTriangleMesh.from_triangles(strip(4), surface=ms.meshes.cylinder(1.0, 1.0, cells=(8, 2)))

@@ -111,6 +111,7 @@ def test_random_shapes_keep_the_angles_and_have_a_manifold_surface(seed):
         assert mesh.second_order(shape).quality.jacobian_ratios.min() > 0.05
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_surface_where_shapes_meet_in_a_point_or_an_edge():
     """Test lattice points that move onto the contact of two solids, which would then be connected by a vertex or an
     edge.

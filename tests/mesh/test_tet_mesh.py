@@ -209,7 +209,7 @@ def test_volume_of_curved_tetrahedra_is_exact():
     assert bent.volume == pytest.approx(1.3 * 1.1, rel=1e-13)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10**6), st.floats(0.0, 0.5))
 def test_no_inverted_point_goes_unnoticed(seed, amount):
     """Check that a mesh that is accepted has a positive Jacobian everywhere, wherever its mid-edge nodes are."""

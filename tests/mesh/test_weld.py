@@ -14,7 +14,7 @@ def moved(x=0.0, y=0.0, mesh=UNIT):
     return mesh.transformed(translation=(x, y, 0.0))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.permutations([(0, 0), (1, 0), (0, 1), (1, 1)]), st.floats(-4, 4))
 def test_four_squares_in_any_order_are_one(corners, exponent):
     parts = [moved(x, y).scaled(10.0**exponent) for x, y in corners]

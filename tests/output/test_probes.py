@@ -190,6 +190,7 @@ def test_field_on_a_line_has_a_sign_and_others_their_magnitude() -> None:
         cases_in([(1e-3, 0, 0), (1e-3, 0, 0)]).plot_history("bending_energy", against="field")
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_factor_on_a_magnet_is_what_changes_of_its_field() -> None:
     magnet = ms.Dipoles([[0.05, 0.005, -0.05]], [[0.0, 0.0, 1.0]])
     scene = ms.Scene(SHEET, supports=[CLAMP], field=magnet, gravity=(0, 0, -9.81))

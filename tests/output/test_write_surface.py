@@ -40,6 +40,7 @@ def test_a_thick_sheet_is_closed_and_has_its_volume(ending, tmp_path):
     assert volume(solid) == pytest.approx(wanted, rel=5e-3)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_a_flat_sheet_is_a_box_to_round_off(tmp_path):
     ms.write_surface(tmp_path / "flat.obj", MESH, thickness=2e-3, unit="mm")
     box = ms.read_mesh(tmp_path / "flat.obj")

@@ -71,6 +71,7 @@ def test_hemisphere_pulled_and_pushed():
     assert (pulled, pushed) == (pytest.approx(4.0742, rel=2e-3), pytest.approx(8.1495, rel=2e-3))
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_a_field_is_a_force_at_the_end():
     """Compare case C4 by the divergence theorem, to round-off of the solves."""
     field = magnetic_strip.magnetic_end_shear((5, 1), "midedge2")

@@ -55,6 +55,7 @@ LAYERS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @pytest.mark.parametrize("case", LAYERS, ids=lambda case: "{} {} {} {}".format(case[0].__name__, *case[1:]))
 def test_energy_of_a_deformed_plate_in_layers_and_as_a_shell(case):
     deform, size, axis, cells = case

@@ -27,7 +27,7 @@ def solve():
 
 RETURNS = """
 sent, handled = [], []
-signal.signal(signal.SIGTERM, lambda *_: handled.append(time.process_time()))
+signal.signal(signal.SIGTERM, lambda *_: handled.append(len(sent)))
 _, quiet = solve()
 going_on = True
 
@@ -35,18 +35,20 @@ def send(generator=random.Random(0)):
     while going_on:
         time.sleep(generator.uniform(0.0, 0.03))
         if len(handled) == len(sent):
-            sent.append(time.process_time())
+            sent.append(len(sent))
             os.kill(os.getpid(), signal.SIGTERM)
 
 sender = threading.Thread(target=send)
 sender.start()
-results = [solve()[1] for _ in range(3)]
+results = []
+while len(handled) < 12 and len(results) < 12:
+    results.append(solve()[1])
 going_on = False
 sender.join()
 time.sleep(0.01)
 assert all(np.array_equal(result, quiet) for result in results), "another result"
-assert len(sent) > 10 and len(handled) == len(sent), (len(sent), len(handled))
-print(max(b - a for a, b in zip(sent, handled)))
+assert len(handled) == len(sent), (len(sent), len(handled))
+assert len(results) < 12, "a solve ended before the handler of a signal within it ran"
 """
 
 RAISES = """
@@ -104,11 +106,9 @@ def run(script: str) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, "-c", SOLVE + script], capture_output=True, text=True, timeout=120)
 
 
-@pytest.mark.alone
 def test_a_handler_that_returns_runs_soon_and_the_solve_goes_on():
     result = run(RETURNS)
     assert result.returncode == 0, result.stderr
-    assert float(result.stdout) < 1.0  # s of the processor, as another process may hold it meanwhile
 
 
 def test_a_handler_that_raises_ends_the_solve():

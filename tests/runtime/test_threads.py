@@ -1,4 +1,4 @@
-"""How many threads loops begin with, which sheets want any, and that no loop waits for a thread that does not come."""
+"""How many threads loops begin with, and that no loop waits for a thread that does not come."""
 
 import os
 import subprocess
@@ -222,25 +222,12 @@ for _ in range(3):
 assert len(threads() - before) > 1
 """
 
-SMALL = """
-small = cantilever((8, 8))  # 128 faces
-undisturbed = False
-for attempt in range(20):  # a system that takes the processor from us makes a part look long
-    ms.set_num_threads(2 + attempt % 2)
-    ms.equilibrium(small)
-    undisturbed = undisturbed or threads() == before
-assert undisturbed
-ms.set_num_threads(2)
-assert bits(scene) == expected and len(threads() - before) == 1
-"""
-
 
 @LINUX
 def test_a_loop_ends_without_helpers_that_were_stopped():
     printed_by(SHEET + STOPPED, timeout=100)
 
 
-@pytest.mark.alone
 @LINUX
 @pytest.mark.skipif(
     SANITIZED, reason="ThreadSanitizer allows no threads after a fork of a process with threads"
@@ -254,10 +241,3 @@ def test_results_have_the_same_bits_with_more_threads_than_processors():
     """Run all threads on one processor, so that most of them wait for it at any time, also within a loop."""
     one = min(os.sched_getaffinity(0))
     printed_by(SHEET + CROWDED, preexec_fn=lambda: os.sched_setaffinity(0, {one}))
-
-
-@pytest.mark.alone
-@LINUX
-@pytest.mark.skipif(SANITIZED, reason="sanitizers make the loops of small sheets long")
-def test_small_sheets_wake_nobody():
-    printed_by(SHEET + SMALL)

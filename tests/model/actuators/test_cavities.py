@@ -254,6 +254,7 @@ def test_gas_in_motion(integrator):
     assert inside.volume[-1] > inside.volume[0] * 1.001
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_a_motion_with_gas_conserves_energy():
     body = box_sheet(size=0.03, thickness=1e-3)
     gas = ms.Cavity(body, gas_pressure=1.2e5)

@@ -303,6 +303,7 @@ def test_supports_that_push_bodies_through_each_other_raise_an_error():
         ms.equilibrium(scene)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_relaxation_that_ends_early_reports_contacts():
     touching = two_sheets(height=1.03e-3)
     scene = ms.Scene(

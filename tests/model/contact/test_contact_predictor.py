@@ -38,6 +38,7 @@ def test_an_impact_takes_few_factorizations(friction):
     assert np.all(motion.positions[-1, :, 2] > -1.1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_landing_body_does_not_penetrate_the_body_on_it():
     lower = ms.meshes.rectangle(0.02, 0.02, cells=(6, 6), irregular=0.2)
     upper = lower.transformed(translation=(1e-3, 5e-4, 1.02e-3))
@@ -50,6 +51,7 @@ def test_landing_body_does_not_penetrate_the_body_on_it():
     assert min(least) > 1e-3  # the sheets' thickness
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_landing_solid_is_not_inverted():
     mesh = ms.meshes.box((0.02, 0.02, 0.01), cells=(4, 4, 2))
     material = ms.NeoHookean(young_modulus=1e4, poisson_ratio=0.4)

@@ -54,6 +54,7 @@ def test_published_numbers_are_those_of_the_closed_form():
     assert 0.5 * ACCELERATION_049 * TIME**2 == pytest.approx(DISTANCE_049, rel=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @PLACES
 @FRICTIONS
 def test_slides_at_049_as_far_as_backward_euler(make_scene, lagged):
@@ -69,6 +70,7 @@ def test_sticks_at_050(make_scene, lagged):
     assert distances[-1].max() <= STICKING * TIME
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", SECOND_ORDER, ids=repr)
 def test_methods_of_second_order_reach_the_continuous_distance(integrator):
     distances, _ = slid(on_tilted_gravity, 0.49, integrator=integrator)

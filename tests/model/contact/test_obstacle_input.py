@@ -213,6 +213,7 @@ def test_missing_file_is_missing(tmp_path):
         ob.MeshObstacle(tmp_path / "rock.ply")
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_a_mesh_from_a_file(tmp_path):
     ms.write_mesh(tmp_path / "ball.ply", BALL)
     points = np.array([[0.5, 0, 0], [1.2, 0, 0]])

@@ -64,7 +64,7 @@ def test_points_that_are_no_numbers_stay_so():
         assert np.isnan(core.distances(made(name)._core, np.full((1, 3), np.nan))[0]).all() or "mesh" in name
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.5))
 def test_box_by_its_nearest_point(seed, rounding):
     rng = np.random.default_rng(seed)
@@ -79,7 +79,7 @@ def test_box_by_its_nearest_point(seed, rounding):
     np.testing.assert_allclose(found, wanted, atol=1e-14)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_capsule_by_its_nearest_point(seed):
     rng = np.random.default_rng(seed)
@@ -111,7 +111,7 @@ def test_a_radius_that_grows_evenly_makes_a_cone():
     np.testing.assert_allclose(tube.signed_distance(points), wanted, atol=1e-13)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1))
 def test_closed_tube_is_the_union_of_its_balls(seed):
     rng = np.random.default_rng(seed)

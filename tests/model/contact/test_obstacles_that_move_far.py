@@ -12,6 +12,8 @@ import pytest
 import magshell as ms
 from magshell import obstacles as ob
 
+pytestmark = pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
+
 RADIUS, CELLS = 0.1, 8
 TOUCHING = 1e-4  # m, above the sheet
 
@@ -222,6 +224,7 @@ def test_a_small_ball_that_would_slip_between_contact_points_is_an_error(
         assert found.stable and found.positions[:, 2].min() < -0.03
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize(
     "make",
     [

@@ -195,5 +195,6 @@ def test_a_start_inside_where_a_value_moves_the_surface():
         simulated(scene, 1, 1e-3, values={scene.contacts[0]: {"offset": 0.01}})
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_touching_is_not_inside():
     simulated(block_on(GROUND), 2, 1e-3, start=lowered(0.9e-3))

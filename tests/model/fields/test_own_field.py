@@ -364,6 +364,7 @@ def test_hessians_as_matrices_name_what_works_with_the_own_field():
         ms.hessian(scene, scene.mesh.rest_positions, remanent_magnetization=(6e4, 0, 0))
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_a_scene_that_supports_hold_throughout_has_its_own_field():
     mesh = ms.meshes.rectangle(SIZE, SIZE, cells=(2, 2))
     meshes = [mesh, mesh.transformed(translation=(0, 0, 1e-3 + THICKNESS))]

@@ -179,6 +179,7 @@ def test_a_moment_spins_a_ball_and_its_parent_the_other_way():
     assert np.linalg.norm(move[joint].rate[-1]) > 0.3
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_gradient_by_a_moment_in_time():
     links, _ = chain(2)
     joints = [

@@ -151,6 +151,7 @@ def carrying(part, sheet=None, **scene):
     return ms.Scene([sheet or strip(), part], supports=[ms.Clamp(MESH.edges_at(x=0.0))], **scene)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_a_payload_bends_a_strip_as_in_beam_theory():
     """Compare with a force and a moment at 0.09 m, where the body begins, from a center beyond the strip's end."""
     mass, weight = 1e-6, 1e-2

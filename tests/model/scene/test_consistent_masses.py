@@ -48,6 +48,7 @@ def test_consistent_masses_of_bodies_sum_up_to_the_lumped_ones(name):
         np.testing.assert_allclose(matrix.sum(axis=1), together, rtol=1e-12, atol=1e-12 * lumped.max())
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 @pytest.mark.parametrize(
     "name",
     [

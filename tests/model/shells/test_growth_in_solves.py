@@ -51,6 +51,7 @@ def test_growth_over_time(mesh, as_function):
     assert motion.energies["membrane"].max() < 1e-3 * 1e6 * 1e-3 * 0.04 * LENGTH * WIDTH
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_viscosity_uses_strains_relative_to_growth():
     """Check that a jump of growth is no strain rate: viscous terms use strains relative to the growth at their time."""
     ends = {}

@@ -69,6 +69,7 @@ def test_obtuse_faces_at_the_border_are_warned_of_once_a_scene():
         )  # bent so little that it does not matter
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning", "ignore::magshell.StepErrorWarning")
 def test_a_motion_and_a_path_warn_too():
     mesh = crossed(LENGTH, WIDTH, (20, 2), [0.01, 0.5])
     sheet = ms.Shell(mesh, thickness=LENGTH / 400, young_modulus=1e6, poisson_ratio=0.0, mass_density=1e3)

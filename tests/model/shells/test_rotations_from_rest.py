@@ -91,6 +91,7 @@ SCENES = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("name", SCENES)
 def test_linear_response_equals_that_of_the_full_hessian(name) -> None:
     scene = SCENES[name]()
@@ -110,6 +111,7 @@ def test_linear_response_equals_that_of_the_full_hessian(name) -> None:
     )
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_later_solves_measure_rotations_as_before() -> None:
     scene, untouched = loaded_scene(arched), loaded_scene(arched)
     ms.linear_response(scene)

@@ -10,6 +10,8 @@ from model_access import LoadParameters, Problem
 import magshell as ms
 from magshell.model.supports.supports import rotation_matrix
 
+pytestmark = pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
+
 YOUNG, THICKNESS = 2e6, 2e-3  # Pa, m
 OBLIQUE = rotation_matrix(np.array([0.7, -1.1, 0.4]))
 MAGNETIZATION = (4e4, 0.0, 0.0)
@@ -221,6 +223,7 @@ def test_motion_has_strains_in_each_state(dtype):
 # The warning
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_large_strain_is_warned_of_at_the_callers_line():
     """Check a strip at 1000 T, which is "stable" at several times its length."""
     with pytest.warns(
@@ -233,6 +236,7 @@ def test_large_strain_is_warned_of_at_the_callers_line():
     assert [warning.filename for warning in strains] == [__file__]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_strain_warning_comes_once_a_scene_and_again_at_doubled_strain():
     scene = strip(cells=(10, 2), field=ms.UniformField())
     with pytest.warns(ms.LargeStrainWarning) as caught:
@@ -254,6 +258,7 @@ def test_moderately_large_strain_is_no_mistaken_unit():
     assert 0.2 < found.largest_membrane_strain < 1.0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_strain_warning_as_an_error_contains_the_result():
     scene = strip(cells=(10, 2), field=ms.UniformField())
     for _ in range(2):
@@ -264,6 +269,7 @@ def test_strain_warning_as_an_error_contains_the_result():
         assert error.value.last_good.largest_membrane_strain > 2.0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_motion_and_a_path_name_the_state():
     mesh = ms.meshes.rectangle(0.1, 0.02, cells=(4, 1))
     shell = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)

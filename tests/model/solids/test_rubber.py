@@ -10,6 +10,8 @@ import torch
 import magshell as ms
 from magshell.model.solids.solid_stresses import states_of
 
+pytestmark = pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
+
 YEOH = {"c10": 0.2e6, "c20": -4e3, "c30": 0.3e3}
 MOONEY_RIVLIN = {"c10": 0.16e6, "c01": 0.04e6}
 SHEAR = 0.4e6  # Pa, of both for small strains

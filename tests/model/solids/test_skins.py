@@ -205,6 +205,7 @@ def test_same_bits_on_any_number_of_threads(element):
             np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_a_skin_with_mass_weighs_and_is_inert(element):
     """Check that a skin adds thickness times density on each face to the solid's masses."""

@@ -69,6 +69,7 @@ def held(velocities, degrees) -> tuple[np.ndarray, np.ndarray]:
     return GRAVITY * np.sin(angle) - change @ DOWNHILL, GRAVITY * np.cos(angle) + change @ NORMAL
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @ELEMENTS
 @ROWS
 def test_accelerations_are_those_of_the_validation_set(degrees, friction, acceleration, element):

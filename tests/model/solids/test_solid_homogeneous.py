@@ -166,6 +166,7 @@ def pull(solid: ms.Solid, pulled: str, stretch: float) -> ms.Scene:
     return ms.Scene(solid, supports=pins)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 @pytest.mark.parametrize("case", STRETCHED, ids=lambda case: "{} {} {}".format(*case))
 def test_t2a_stretched_blocks(case, element):

@@ -57,6 +57,7 @@ def test_frequencies_of_a_cantilever(nu):
     assert np.allclose(modes.frequencies[2:], timoshenko(2, nu), rtol=0.02)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_a_mean_volume_needs_two_cells_through_a_thickness():
     """Check the errors that Solid's docstring states: with one cell the two lowest frequencies are 2 and 12 % low."""
     solid = bar(0.45, cells=(16, 1, 1))
@@ -79,6 +80,7 @@ def test_free_solid_has_six_rigid_motions():
     assert np.all(modes.squares[:6] == 0.0) and modes.squares[6] > 0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_a_heart_s_material_vibrates_too():
     material = ms.Guccione(
         stiffness=1e4,

@@ -9,6 +9,8 @@ import torch
 import magshell as ms
 from magshell.model.solids.solid_stresses import states_of
 
+pytestmark = pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
+
 MODULI = {"young_modulus": 1e5, "poisson_ratio": 0.45}
 GUCCIONE = {
     "stiffness": 1e4,

@@ -106,6 +106,7 @@ def test_free_rigid_parts_are_drawn(tmp_path) -> None:
     assert fallen[0] > fallen[1] > fallen[2]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_springs_and_creases_are_on_the_page(tmp_path) -> None:
     crease = ms.Crease(MESH.edges_at(x=0.02), stiffness=1e-4)
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=2e3, creases=[crease])

@@ -128,6 +128,7 @@ def test_gradients_are_those_of_single_motions(storage):
     np.testing.assert_allclose(together[2].grad, alone[2].grad, rtol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_member_that_fails_loses_no_other():
     """Load one member by a force under which its steps do not converge."""
     torch = pytest.importorskip("torch")

@@ -64,6 +64,7 @@ def test_lagged_friction_is_as_newton_has_it():
     assert np.abs(found.positions - exact.positions).max() < 1e-8 * SIZE
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_a_sheet_that_touches_itself():
     """Use a strip bent to a hook, the ends of which gravity closes."""
     strip = ms.meshes.rectangle(0.06, 0.01, cells=(12, 2))

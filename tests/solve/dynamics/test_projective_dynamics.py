@@ -37,6 +37,7 @@ def test_rounds_as_they_are_lead_there_too():
     assert all(later < 0.7 * earlier for earlier, later in pairwise(errors))
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_solver_recovers_from_inverted_elements():
     solid = bar(MATERIALS["Projective"])
     scene = ms.Scene(solid, supports=[clamped(solid)])
@@ -251,6 +252,7 @@ def test_ctrl_c_hands_back_the_motion_and_leaves_the_scene_as_it_was(contact):
     assert (ms.simulate(scene, **given).positions == whole.positions).all()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_rounds_without_a_tolerance_do_not_run_away():
     """Check that steps that overshoot are shortened, because the matrix is no bound of Corotated's stiffness."""
     solid = bar(MATERIALS["Corotated"])
@@ -267,6 +269,7 @@ def test_rounds_without_a_tolerance_do_not_run_away():
     assert all(later < 0.7 * earlier for earlier, later in pairwise(errors))
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("time_step", [1e-5, 1e-3, 1e-1])
 def test_short_and_long_steps(time_step):
     solid = bar(MATERIALS["Projective"])

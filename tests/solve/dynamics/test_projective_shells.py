@@ -77,6 +77,7 @@ def test_a_sheet_that_lands_beside_a_block():
     assert np.abs(found.positions - exact.positions).max() < 1e-7 * 0.06
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 @pytest.mark.parametrize("bending", BENDINGS[1:])
 def test_strongly_bent_shells_keep_their_stiffness(bending):
     """Check a flag that hangs down from one end: after a rotation by 90 degrees a step takes as many iterations as

@@ -156,6 +156,7 @@ def motion_in_parts():
     return move
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_gradient_through_steps_in_parts_warns_that_objectives_may_jump() -> None:
     move = motion_in_parts()
     torch = pytest.importorskip("torch")

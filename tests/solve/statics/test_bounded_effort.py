@@ -26,6 +26,7 @@ def test_a_search_gives_up_at_its_number_of_factorizations_and_says_what_it_saw(
     assert "Start from a nearby equilibrium, or allow it more (max_factorizations of the solver)" in text
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_a_modulus_of_the_wrong_unit_is_told_as_the_likely_cause():
     """Use E = 1e-10 Pa under gravity, which used to take 10,842 iterations before advising more of them."""
     with pytest.raises(
@@ -36,6 +37,7 @@ def test_a_modulus_of_the_wrong_unit_is_told_as_the_likely_cause():
     assert caught.value.last_good.iterations < 5000
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @pytest.mark.parametrize(("young_modulus", "strain"), [(1e6, 1e-3), (1e3, 1.0), (1e-10, 1e13)])
 def test_the_strain_of_a_load_is_that_of_a_bar_under_its_weight_in_order_of_magnitude(young_modulus, strain):
     """Compare with rho g L / E = 981 Pa / E; a flat sheet clamped at one end has a third to a tenth of that."""
@@ -43,6 +45,7 @@ def test_the_strain_of_a_load_is_that_of_a_bar_under_its_weight_in_order_of_magn
     assert 0.02 * strain < found < strain
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_iterations_without_a_factorization_count_too():
     with pytest.raises(ms.NotConverged, match="it gave up after") as caught:
         ms.equilibrium(cantilever(1e-10), solver=ms.MixedNewton(max_factorizations=300))

@@ -93,6 +93,7 @@ def test_cases_start_from_cases(scene):
         ms.equilibrium(scene, **inputs, start=first[:2])
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_a_failing_case_is_named_and_the_others_kept(scene):
     fields = [(0, 0, 1e-3), (0, 0, 50.0)]
     solver = ms.MixedNewton(max_iterations=2, min_load_step=1.0, max_relaxation_steps=1)

@@ -182,6 +182,7 @@ def closing(x):
     return next(each for each in path.critical if each.kind == "limit")
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_flaps_snap_together_at_the_limit_point():
     """Check the field at which no equilibrium is left, by bisection of solves."""
     limit = float(closing(ZERO).parameter)
@@ -207,6 +208,7 @@ def test_flaps_snap_together_at_the_limit_point():
     assert low * (1.0 - 1e-5) <= limit <= high * (1.0 + 1e-5)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_a_limit_point_with_the_own_field_has_gradients():
     weights = torch.from_numpy(np.random.default_rng(3).standard_normal((2 * FLAP.n_vertices, 3)))
 

@@ -71,6 +71,7 @@ def test_a_start_at_rest_takes_no_load_step() -> None:
     assert [step.method for step in same.log] == ["stability"]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_a_failure_says_which_methods_were_tried() -> None:
     with pytest.raises(ms.NotConverged, match=r"Steps taken: load step \d+ \(\d+ failed\)") as caught:
         ms.equilibrium(

@@ -263,11 +263,12 @@ def sampling_errors(
 
 def _size_of_forces(forces: np.ndarray, couples: np.ndarray, extent: float) -> float:
     """Return the force [N] to which an error refers, from forces (n, 3) N and couples (n, 3) N m on the parts of a body."""
-    return max(
-        float(np.linalg.norm(forces.sum(axis=0))),
-        CANCELLING * float(np.linalg.norm(forces, axis=1).sum()),
-        float(np.linalg.norm(couples, axis=1).sum()) / extent,
-    )
+    with np.errstate(over="ignore"):  # the caller asks whether the result is finite
+        return max(
+            float(np.linalg.norm(forces.sum(axis=0))),
+            CANCELLING * float(np.linalg.norm(forces, axis=1).sum()),
+            float(np.linalg.norm(couples, axis=1).sum()) / extent,
+        )
 
 
 def _sources(values: Values, positions: np.ndarray, field_factor: float, flux_density: Any) -> Sources | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import importlib
 import shutil
@@ -62,15 +63,16 @@ def _write_gif(path: Path, images: Iterable[np.ndarray], samples: list[np.ndarra
     palette = _palette(samples)
     frames = (image.fromarray(each).quantize(palette=palette, dither=image.Dither.NONE) for each in images)
     first = next(frames)
-    first.save(
-        path,
-        format="GIF",
-        save_all=True,
-        append_images=frames,
-        duration=10 * round(100 / fps),
-        loop=0,
-        optimize=False,
-    )
+    with path.open("wb") as file:
+        first.save(
+            file,
+            format="GIF",
+            save_all=True,
+            append_images=frames,
+            duration=10 * round(100 / fps),
+            loop=0,
+            optimize=False,
+        )
 
 
 def _palette(samples: list[np.ndarray]):
@@ -119,6 +121,8 @@ def _write_mp4(path: Path, images: Iterable[np.ndarray], fps: float) -> None:
         finally:
             process.kill()
             process.wait()
+            with contextlib.suppress(BrokenPipeError):
+                process.stdin.close()
         if failed:
             complaints.seek(0)
             said = complaints.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]

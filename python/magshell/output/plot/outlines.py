@@ -133,12 +133,13 @@ def _depths(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     a, b, c = np.moveaxis(triangles[triangle], 1, 0)
     one, other, offset = (b - a)[:, :2], (c - a)[:, :2], points[point] - a[:, :2]
     area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # Triangles seen edge-on cover nothing: their quotients are not finite.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         s = (offset[:, 0] * other[:, 1] - offset[:, 1] * other[:, 0]) / area
         t = (one[:, 0] * offset[:, 1] - one[:, 1] * offset[:, 0]) / area
-    inside = (area != 0.0) & (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
+        inside = (area != 0.0) & (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
+        depths = a[:, 2] + s * (b - a)[:, 2] + t * (c - a)[:, 2]
     found = np.full(len(points), -np.inf)
-    depths = a[:, 2] + s * (b - a)[:, 2] + t * (c - a)[:, 2]
     np.maximum.at(found, point[inside], depths[inside])
     return found
 
