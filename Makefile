@@ -94,11 +94,11 @@ $(VENV)/.created: scripts/setup.sh
 	touch $@
 
 # A wheel of the package, with the kernels that tests and benchmarks call, and that one installed. build/make is kept for the
-# next time; a plain `pip install .` builds in a directory of its own, so that its options do not end up in this one's cache.
+# next time; a plain `pip install .` keeps a folder of its own (scripts/build_backend.py), as its bindings are others.
 # Without MAKEFLAGS, as Ninja would take the number of jobs from it, which is that of recipes.
 $(VENV)/.wheel: $(sources) $(VENV)/.created
 	rm -rf build/wheels
-	@echo "Building magshell (some minutes the first time; all that is said goes into build/make.log):"
+	@echo "Building magshell (all that is said goes into build/make.log):"
 	@env -u MAKEFLAGS $(VENV)/bin/python scripts/build_progress.py build/make.log \
 	    $(PIP) wheel --verbose --no-deps --no-build-isolation --check-build-dependencies \
 	    --config-settings=build-dir=build/make --config-settings=cmake.define.MAGSHELL_TESTING=ON \

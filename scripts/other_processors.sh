@@ -6,14 +6,13 @@
 #
 # Without names: the last three, which hold the others. nehalem, haswell, zen and skylakex are settings of numpy's, scipy's and
 # torch's linear algebra (OpenBLAS, MKL), of numpy's and torch's own loops and of the C library's functions; what this processor
-# lacks is left out, and said. For zen the OpenBLAS of numpy and scipy takes Haswell's kernels (numpy 2.4, scipy 1.17: the same bits). x86-64-v2 and
-# v3 compile the extension, in a directory each, and run it on the libraries of nehalem and haswell. Without arguments of
-# pytest: every test. $PYTHON is an interpreter with what the tests need. Every failure is a test, or code, that hangs on how
-# numbers were rounded.
+# lacks is left out, and said. For zen the OpenBLAS of numpy and scipy takes Haswell's kernels (numpy 2.4, scipy 1.17: the same
+# bits). x86-64-v2 and v3 compile the extension, in a directory each, and run it on the libraries of nehalem and haswell. Without
+# arguments of pytest: the tests of `make test`. $PYTHON is an interpreter with what the tests need. Every failure is a test, or
+# code, that hangs on how numbers were rounded.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 python=$(command -v "${PYTHON:-python3}")
-PATH=$(dirname "$python"):$PATH  # where pip puts cmake and ninja
 
 known=(nehalem haswell zen skylakex x86-64-v2 x86-64-v3)
 chosen=()
@@ -24,6 +23,7 @@ while [ $# -gt 0 ] && [ "$1" != -- ]; do
 done
 [ $# -eq 0 ] || shift
 arguments=("$@")
+[ ${#arguments[@]} -gt 0 ] || arguments=(-m "not nightly")
 [ ${#chosen[@]} -gt 0 ] || chosen=(skylakex x86-64-v2 x86-64-v3)
 [ "$(uname -m)" = x86_64 ] || { echo "these are x86-64 processors; this one is a $(uname -m)" >&2; exit 2; }
 
@@ -48,23 +48,10 @@ avx2() {
     NPY_DISABLE_CPU_FEATURES=$(numpy_without 'AVX512|V4')
 }
 
-# The package with the extension compiled for a family, in build/$1/site, before any other.
+# The package with the extension compiled for a family, before any other.
 compiled_for() {
-    local build=build/$1
-    mkdir -p build
-    if [ ! -f "$build/CMakeCache.txt" ]; then
-        cmake -G Ninja -S . -B "$build" -DMAGSHELL_TESTING=ON -DMAGSHELL_NATIVE=OFF -DMAGSHELL_BASELINE="$1" -DPython_EXECUTABLE="$python" \
-            -DSKBUILD_PROJECT_VERSION="$(sed -n 's/^version = "\(.*\)"$/\1/p' pyproject.toml)" \
-            -Dpybind11_DIR="$("$python" -m pybind11 --cmakedir)" ${CMAKE_ARGS:-} >"$build.log" ||
-            { cat "$build.log"; rm -f "$build/CMakeCache.txt"; return 1; }
-    fi
-    "$python" scripts/build_progress.py "$build.log" cmake --build "$build" --parallel "${JOBS:-$(nproc)}" || return 1
-    rm -rf "$build/site"
-    mkdir "$build/site"
-    cp -r python/magshell "$build/site"
-    rm -f "$build"/site/magshell/_core*.so  # another build's, which the install would take for its own if it is as new
-    cmake --install "$build" --prefix "$build/site" >>"$build.log"
-    export PYTHONPATH=$PWD/$build/site${PYTHONPATH:+:$PYTHONPATH}
+    PYTHON=$python scripts/build_aside.sh "$1" -DMAGSHELL_NATIVE=OFF -DMAGSHELL_BASELINE="$1" || return 1
+    export PYTHONPATH=$PWD/build/$1/site${PYTHONPATH:+:$PYTHONPATH}
 }
 
 as_processor() {
@@ -80,7 +67,7 @@ as_processor() {
         x86-64-v3) compiled_for "$1" && avx2 Haswell && export MAGSHELL_VECTORS=baseline || return 1 ;;
     esac
     "$python" -m pytest -q -p no:cacheprovider -n "${PROCESSES:-auto}" --dist loadfile --no-loadscope-reorder \
-        ${arguments[@]+"${arguments[@]}"}
+        "${arguments[@]}"
 }
 
 failed=()

@@ -12,19 +12,7 @@ sanitizers=${1:?"which: address,undefined or thread"}
 shift
 python=$(command -v "${PYTHON:-python3}")
 build=build/sanitize-${sanitizers%%,*}
-PATH=$(dirname "$python"):$PATH  # where pip puts cmake and ninja
-
-if [ ! -f "$build/CMakeCache.txt" ]; then
-    cmake -S . -B "$build" -DMAGSHELL_TESTING=ON -DMAGSHELL_SANITIZE="$sanitizers" -DPython_EXECUTABLE="$python" \
-        -Dpybind11_DIR="$("$python" -m pybind11 --cmakedir)" ${CMAKE_ARGS:-} ||
-        { rm -f "$build/CMakeCache.txt"; exit 1; }
-fi
-cmake --build "$build" --parallel 2
-rm -rf "$build/site"
-mkdir "$build/site"
-cp -r python/magshell "$build/site"
-rm -f "$build"/site/magshell/_core*.so  # another build's, which the install would take for its own if it is as new
-cmake --install "$build" --prefix "$build/site"
+PYTHON=$python JOBS=2 scripts/build_aside.sh "$(basename "$build")" -DMAGSHELL_SANITIZE="$sanitizers"
 
 declare -A library=([address]=libasan.so [undefined]=libubsan.so [thread]=libtsan.so)
 path_of() { "${CXX:-c++}" -print-file-name="$1"; }

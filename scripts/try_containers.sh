@@ -70,7 +70,7 @@ TRY
     tags=(--platform "linux_$machine" --platform "manylinux2014_$machine")
     for minor in $(seq 17 41); do tags+=(--platform "manylinux_2_${minor}_$machine"); done
     if "$python" -m pip download --quiet --only-binary=:all: --python-version "$version" --implementation cp "${tags[@]}" \
-        --dest "$shared/packages" "$wheel[plot]" && in_container "$version" "$shared"; then
+        --dest "$shared/packages" "${wheel}[plot]" && in_container "$version" "$shared"; then
         say "$version: passed"
     else
         failed+=("$(basename "$wheel")")

@@ -11,7 +11,7 @@ trap 'rm -rf "$bare"' EXIT
 
 "${PYTHON:-python3}" -m venv "$bare/venv"
 torch=$(grep -o '"torch==[0-9.]*"' pyproject.toml | tr -d '"')  # the release that `make test` takes, its CPU build if there
-"$bare/venv/bin/pip" install --quiet "$wheel[plot]" "$torch" pytest
+"$bare/venv/bin/pip" install --quiet "${wheel}[plot]" "$torch" pytest
 mkdir "$bare/tests" && cp README.md "$bare/" && cp -r docs "$bare/"  # the README's links lead there
 cp {CONTRIBUTING,SECURITY}.md CITATION.cff LICENSE "$bare/"
 cp -r tests/conftest.py tests/support "$bare/tests/"

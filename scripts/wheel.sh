@@ -22,8 +22,7 @@ if [ -z "${AGAIN:-}" ]; then
     "$python" -m build --no-isolation --sdist --outdir dist .
     tar -xzmf dist/*.tar.gz -C build/sdist --strip-components=1  # the wheel is made from it, so that it holds all that is needed
 else
-    # They have the paths of the Python before: with the second, scikit-build-core would delete the objects as well.
-    rm -rf dist/raw dist/*.whl build/wheel/CMakeCache.txt build/wheel/.skbuild-info.json
+    rm -rf dist/raw dist/*.whl
 fi
 mkdir -p dist/raw
 CMAKE_BUILD_PARALLEL_LEVEL=${JOBS:-$(nproc)} "$python" -m build --no-isolation --wheel --outdir dist/raw \

@@ -24,10 +24,14 @@ def test_workflow_has_jobs_with_a_machine_and_steps(workflow):
         assert set(job.get("needs", [])) <= set(jobs), name
 
 
-def test_workflow_calls_targets_of_the_makefile_that_exist():
-    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    called = set(re.findall(r"run: make (\w+)", (ROOT / ".github/workflows/ci.yml").read_text()))
-    assert called and called <= targets
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
+def test_workflow_calls_targets_scripts_and_actions_that_exist(workflow):
+    text = workflow.read_text()
+    targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert set(re.findall(r"\bmake (\w+)$", text, re.MULTILINE)) <= set(targets)
+    files = re.findall(r"scripts/[\w.]+", text)
+    files += [f"{action}/action.yml" for action in re.findall(r"uses: \./(\S+)", text)]
+    assert [name for name in files if not (ROOT / name).is_file()] == []
 
 
 def test_every_claimed_python_is_tested_and_gets_a_wheel():
