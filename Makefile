@@ -41,6 +41,7 @@ nightly: $(VENV)/.with-test  ## all other tests, and a search at random: a quart
 	scripts/nightly_tools.sh
 	seed=$${SEED:-$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')} && echo "make nightly SEED=$$seed repeats the search." && \
 	    MAGSHELL_SEARCH=1 $(PYTEST) -m "nightly or hypothesis" --hypothesis-seed=$$seed
+	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/cholmod.sh
 
 change: $(VENV)/.with-test  ## the nightly tests of the rooms that changed since BASE, and of those above them: ten minutes
 	files=$$($(VENV)/bin/python scripts/tests_of.py change $(BASE)) && { [ -z "$$files" ] || $(PYTEST) -m nightly $$files; }
@@ -63,7 +64,7 @@ sanitize: $(VENV)/.with-test  ## tests against an extension that watches its mem
 	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/sanitize.sh address,undefined
 	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/sanitize.sh thread
 
-processors: $(VENV)/.with-test  ## every test as other processors see it: an hour or two
+processors: $(VENV)/.with-test  ## `make test` as other processors see it: an hour or two
 	PYTHON=$(CURDIR)/$(VENV)/bin/python PROCESSES=$(PROCESSES) scripts/other_processors.sh
 
 lint: $(VENV)/.lint  ## ruff, clang-format and plain words, changing nothing
