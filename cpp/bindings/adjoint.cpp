@@ -1,7 +1,10 @@
 // Binds the adjoints: they take the gradient with respect to positions and edge rotations and return the gradients with respect to all
 // parameters of a solve.
+#include <optional>
+
 #include "bindings/model_numbers.h"
 #include "magshell/adjoint/static.h"
+#include "magshell/scene/stress_stiffness.h"
 
 namespace magshell::bindings {
 namespace {
@@ -66,6 +69,18 @@ py::tuple prescribed_vjp(Model& model, const VectorXd& q, const LoadParameters& 
     return py::make_tuple(found[0], found[1], by_rest);
 }
 
+// Returns the derivatives of the stresses times strain curvatures at a state: by all dofs, by all parameters and load parameters, and by the
+// rest shape.
+py::tuple stress_work_vjp(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+                          const std::vector<VectorXd>& curvatures, bool by_rest) {
+    VectorXd by_q = VectorXd::Zero(model.size()), rest;
+    if (by_rest) rest = VectorXd::Zero(3 * model.nodes().n_nodes());
+    const py::tuple found = by_parameters_at(model, q, load_parameters, [&](Gradient& gradient) {
+        add_stress_work_vjp(model, q, load_parameters, curvatures, by_q, gradient, by_rest ? &rest : nullptr);
+    });
+    return py::make_tuple(by_q, found[0], found[1], rest);
+}
+
 }  // namespace
 
 void register_adjoint(py::module_& module) {
@@ -93,6 +108,51 @@ void register_adjoint(py::module_& module) {
         "load parameters; by_rest: also by the rest shape, three numbers per node, else none. What supports "
         "prescribe "
         "stays.");
+    module.def(
+        "freeze_stress_rates",
+        [](Model& model, const VectorXd& q, const LoadParameters& load_parameters,
+           const std::optional<VectorXd>& motion) {
+            const std::lock_guard lock(model.in_use());
+            freeze_stress_rates(model, q, load_parameters, motion ? &*motion : nullptr);
+        },
+        py::arg("model"), py::arg("q"), py::arg("load_parameters"), py::arg("motion").none(true),
+        py::call_guard<py::gil_scoped_release>(),
+        "Hold the stresses of all terms at their rates along a motion of all unknowns (n,) from q, or at "
+        "zero, until "
+        "release_stresses: Hessians are then those of these stresses.");
+    module.def(
+        "release_stresses",
+        [](Model& model) {
+            const std::lock_guard lock(model.in_use());
+            release_stresses(model);
+        },
+        py::arg("model"), py::call_guard<py::gil_scoped_release>(),
+        "Let stresses follow from strains again.");
+    module.def(
+        "strain_rates",
+        [](Model& model, const VectorXd& q, const LoadParameters& load_parameters, const VectorXd& motion) {
+            const std::lock_guard lock(model.in_use());
+            return strain_rates(model, q, load_parameters, motion);
+        },
+        py::arg("model"), py::arg("q"), py::arg("load_parameters"), py::arg("motion"),
+        py::call_guard<py::gil_scoped_release>(),
+        "The rates of the strains of each energy that has a stress, [(k,)], along a motion of all unknowns "
+        "(n,) from q.");
+    module.def(
+        "stress_work_vjp", &stress_work_vjp, py::arg("model"), py::arg("q"), py::arg("load_parameters"),
+        py::arg("curvatures"), py::arg("by_rest") = false,
+        "The derivatives of the stresses at q times fixed strain curvatures, as strain_rates has them: by "
+        "all unknowns, by every value, "
+        "by the load parameters, and, if by_rest, by the rest shape, three numbers per node, else none.");
+    module.def(
+        "without_stress_work_vjp",
+        [](const Model& model) {
+            py::list names;
+            for (const std::string_view name : without_stress_work_vjp(model))
+                names.append(py::str(name.data(), name.size()));
+            return names;
+        },
+        py::arg("model"), "The names of the energies whose stress rates stress_work_vjp leaves out.");
     module.def(
         "at_nodes", &at_nodes, py::arg("model"), py::arg("vector"),
         "The rows of all vertices (n_v, 3) and directions (n_d, 3) of three numbers per node, or of all "

@@ -1,4 +1,6 @@
 // Binds the contact state of bodies, for results.
+#include <algorithm>
+
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "magshell/contact/pair_friction.h"
@@ -14,6 +16,7 @@ namespace {
 py::dict contact_pair_stiffness(Model& model, const VectorXd& q, const VectorXd& v) {
     std::vector<BodyContactTerm::ActiveContact> all;
     std::vector<FrictionLaw> laws;
+    std::vector<SlipStencil> stencils;
     {
         const py::gil_scoped_release unlocked;
         const std::lock_guard lock(model.in_use());
@@ -25,33 +28,41 @@ py::dict contact_pair_stiffness(Model& model, const VectorXd& q, const VectorXd&
         all = model.contacts().bodies()->active_contacts(q.data());
         for (const BodyContactTerm::ActiveContact& touch : all)
             laws.push_back(model.contacts().bodies()->friction(touch));
+        for (const BodyContactTerm::ActiveContact& touch : all)
+            stencils.push_back(model.contacts().bodies()->slip_stencil(touch.near, q.data()));
     }
     const py::ssize_t n = static_cast<py::ssize_t>(all.size());
     IndexArray contacts(n), vertices({n, py::ssize_t{4}});
     py::array_t<bool> swapped(n);
     Array distances(n), normal_forces(n), forces({n, py::ssize_t{4}, py::ssize_t{3}});
     Array weights({n, py::ssize_t{4}}), normals({n, py::ssize_t{3}});
+    constexpr py::ssize_t most = slip_nodes;
+    IndexArray slip_vertices({n, most});
+    Array vertex_friction({n, most, py::ssize_t{3}});
     Array friction({n, py::ssize_t{3}}), sliding({n, py::ssize_t{3}});
     for (py::ssize_t k = 0; k < n; ++k) {
         const BodyContactTerm::ActiveContact& touch = all[k];
         const Proximity& near = touch.at.near();
         const PairVectors gradient = touch.at.gradient();
-        const PairPositions moving = positions_of(touch.near.pair, v.data());
         contacts.mutable_at(k) = touch.near.contact;
         swapped.mutable_at(k) = touch.near.swapped;
         distances.mutable_at(k) = near.distance;
         normal_forces.mutable_at(k) = touch.at.normal_force();
-        Vec3 velocity = Vec3::Zero();
         for (int i = 0; i < 4; ++i) {
             const bool there = i < touch.at.count();
             vertices.mutable_at(k, i) = there ? model.nodes().user_vertex(touch.near.pair.nodes[i]) : -1;
             weights.mutable_at(k, i) = there ? near.weights[i] : 0.0;
-            if (there) velocity += near.weights[i] * moving[i];
             for (int axis = 0; axis < 3; ++axis)
                 forces.mutable_at(k, i, axis) = there ? -gradient[i][axis] : 0.0;
         }
-        const Vec3 force = PairFriction(touch.at, moving, laws[k]).friction().force;
-        const Vec3 along = velocity - near.normal.dot(velocity) * near.normal;
+        const PairFriction pair(touch.at, stencils[k], stencils[k].of(v.data()), laws[k]);
+        const Vec3 &force = pair.friction().force, &along = pair.slip();
+        const SlipVectors on_nodes = pair.force();
+        for (int i = 0; i < slip_nodes; ++i) {
+            slip_vertices.mutable_at(k, i) =
+                i < pair.count() ? model.nodes().user_vertex(stencils[k].nodes[i]) : -1;
+            std::copy_n(on_nodes[i].data(), 3, vertex_friction.mutable_data(k, i, 0));
+        }
         for (int axis = 0; axis < 3; ++axis) {
             normals.mutable_at(k, axis) = near.normal[axis];
             friction.mutable_at(k, axis) = force[axis];
@@ -69,6 +80,8 @@ py::dict contact_pair_stiffness(Model& model, const VectorXd& q, const VectorXd&
     found["normals"] = normals;
     found["friction_forces"] = friction;
     found["sliding_velocities"] = sliding;
+    found["slip_vertices"] = slip_vertices;
+    found["vertex_friction_forces"] = vertex_friction;
     return found;
 }
 
@@ -93,7 +106,8 @@ void register_body_contact(py::module_& module) {
         "Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) "
         "[N], "
         "forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the "
-        "first part, friction_forces (n, 3) [N] on it and sliding_velocities (n, 3) [m/s] of it.");
+        "first part, friction_forces (n, 3) [N] on it and sliding_velocities (n, 3) [m/s] of it; "
+        "vertex_friction_forces (n, 5, 3) [N] on slip_vertices (n, 5), which have no moment.");
 }
 
 }  // namespace magshell::bindings

@@ -129,6 +129,14 @@ class FieldSamplingWarning(UserWarning):
     """
 
 
+class LinearTheoryWarning(UserWarning):
+    """A warning about a linear solve whose displacements are not small, as linear theory takes them to be.
+
+    ms.linear_buckling raises it where, at the first factor, a body rotates by more than 0.1 rad, or a shell bends so far
+    that the strain of its rotation exceeds its membrane strain: a plate does when it has deflected by about its thickness.
+    """
+
+
 class SusceptibilityWarning(UserWarning):
     """A warning about a susceptible shell that is too strongly magnetized for its law, which neglects its own field.
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from contact_pairs import KINDS, LAW, differences, hard_pairs, random_pairs, relative
+from contact_pairs import ALL_KINDS, KINDS, LAW, differences, hard_pairs, random_pairs, relative
 
 from magshell import _core
 
@@ -189,21 +189,60 @@ def test_derivatives_by_the_law(kind, penalty) -> None:
         assert relative(got[:, column : column + 1], ((high - low) / (2 * step))[:, None]) < 1e-5, name
 
 
-@pytest.mark.parametrize("kind", KINDS)
+def with_corners(kind, pairs):
+    """Return pairs (n, 4, 3) with the further corners of the triangle of their second part, (n, 5, 3).
+
+    Nodes that a pair does not have are such corners already.
+    """
+    last = np.zeros((len(pairs), 1, 3))
+    if kind == "edge_edge":
+        last = pairs[:, 3:] + np.random.default_rng(5).standard_normal(last.shape)
+    return np.concatenate([pairs, last], axis=1)
+
+
+@pytest.mark.parametrize("kind", ALL_KINDS)
+@pytest.mark.parametrize("gap", [0.15, 1e-3])
+def test_rigid_motions_are_no_slip_and_friction_has_no_moment(kind, gap) -> None:
+    x = with_corners(kind, near_ones(kind, random_pairs(kind, 300, gap=gap), LAW))
+    rng = np.random.default_rng(4)
+    nodes = 5 if kind == "edge_edge" else 4
+    spin, shift, v = rng.standard_normal((3, len(x), 1, 3))
+    rigid = np.cross(spin, x) + shift
+    numbers = (0.5, 0.7, 0.1)
+    at = _core.pair_frictions(kind, x, AREA, 0.0, LAW, rigid, numbers, rigid)
+    assert np.abs(at["slip"]).max() < 1e-12
+    v = rng.standard_normal(x.shape)
+    v[:, nodes:] = 0.0
+    force = _core.pair_frictions(kind, x, AREA, 0.0, LAW, v, numbers, v)["force"]
+    size = np.abs(force).max(axis=(1, 2))
+    assert np.abs(force.sum(axis=1)).max(axis=1) == pytest.approx(0.0 * size, abs=1e-12 * size.max())
+    moment = np.cross(x, force).sum(axis=1)
+    assert np.abs(moment).max(axis=1) == pytest.approx(0.0 * size, abs=1e-11 * size.max())
+    # The first part takes the friction of Coulomb's law whole.
+    parts = 2 if kind == "edge_edge" else 1
+    law = _core.pair_energies(kind, x[:, :4], AREA, 0.0, LAW)["normal_force"]
+    slip = _core.pair_frictions(kind, x, AREA, 0.0, LAW, v, numbers, v)["slip"]
+    fast = np.linalg.norm(slip, axis=1) > 1.0  # ten times the sticking speed: kinetic friction
+    assert np.linalg.norm(force[:, :parts].sum(axis=1), axis=1)[fast] == pytest.approx(0.5 * law[fast])
+
+
+@pytest.mark.parametrize("kind", ALL_KINDS)
 def test_derivatives_of_friction(kind) -> None:
     law = LAW | {"min_distance": 0.03}
-    x = near_ones(kind, random_pairs(kind, 300, gap=0.15), law)
+    x = with_corners(kind, near_ones(kind, random_pairs(kind, 300, gap=0.15), law))
     parallel = PARALLEL if kind == "edge_edge" else 0.0
     rng = np.random.default_rng(2)
-    v = rng.standard_normal((len(x), 4, 3)) * rng.choice([1e-2, 0.3, 3.0], len(x))[:, None, None]
-    along = rng.standard_normal((len(x), 4, 3))
+    v = rng.standard_normal((len(x), 5, 3)) * rng.choice([1e-2, 0.3, 3.0], len(x))[:, None, None]
+    along = rng.standard_normal((len(x), 5, 3))
+    if kind != "edge_edge":
+        v[:, 4], along[:, 4] = 0.0, 0.0
     numbers = np.array([0.4, 0.7, 0.2])  # kinetic, static, m/s
 
     def friction_of(positions=x, velocities=v, friction=numbers, of=law):
         return _core.pair_frictions(kind, positions, AREA, parallel, of, velocities, tuple(friction), along)
 
     def force(positions=x, velocities=v):
-        return friction_of(positions, velocities)["force"].reshape(len(x), 12)
+        return friction_of(positions, velocities)["force"].reshape(len(x), 15)
 
     def most(got, expected):
         error = np.abs(got - expected).reshape(len(x), -1).max(1) / np.abs(expected).reshape(len(x), -1).max(
@@ -215,12 +254,12 @@ def test_derivatives_of_friction(kind) -> None:
     assert most(at["by_velocity"], differences(lambda each: force(velocities=each), v)) < 1e-6
     by_place = differences(force, x, 1e-7)
     assert most(at["by_place"], by_place) < 1e-5
-    flat = along.reshape(len(x), 12)
+    flat = along.reshape(len(x), 15)
     assert np.allclose(
-        at["along_place"].reshape(-1, 12), np.einsum("ni,nij->nj", flat, at["by_place"]), rtol=1e-9
+        at["along_place"].reshape(-1, 15), np.einsum("ni,nij->nj", flat, at["by_place"]), rtol=1e-9
     )
-    assert np.allclose(at["along_velocity"].reshape(-1, 12), np.einsum("ni,nij->nj", flat, at["by_velocity"]))
-    assert np.allclose(np.einsum("nij,nj->ni", at["secant"], v.reshape(-1, 12)), force(), atol=1e-10)
+    assert np.allclose(at["along_velocity"].reshape(-1, 15), np.einsum("ni,nij->nj", flat, at["by_velocity"]))
+    assert np.allclose(np.einsum("nij,nj->ni", at["secant"], v.reshape(-1, 15)), force(), atol=1e-10)
     for column in range(3):
         step = 1e-6 * np.eye(3)[column]
         high, low = (
@@ -232,7 +271,7 @@ def test_derivatives_of_friction(kind) -> None:
     # The stiffness enters through the normal force only.
     stiffer = friction_of(of=law | {"stiffness": 1.001 * law["stiffness"]})["force"]
     by_stiffness = _core.pair_energies_by_law(
-        kind, x, AREA, parallel, law, 0.0 * along, at["along_normal_force"]
+        kind, x[:, :4], AREA, parallel, law, 0.0 * along[:, :4], at["along_normal_force"]
     )[:, 0]
     expected = ((stiffer - at["force"]) * along).sum((1, 2)) / (0.001 * law["stiffness"])
     assert np.abs(by_stiffness - expected).max() < 1e-9 * np.abs(expected).max()
@@ -241,11 +280,13 @@ def test_derivatives_of_friction(kind) -> None:
 def test_friction_is_that_of_ipctk_in_sticking_and_sliding() -> None:
     ipctk = pytest.importorskip("ipctk", reason="the oracle of contact is not installed")
     x = near_ones("edge_edge", random_pairs("edge_edge", 100, gap=0.1), LAW)
-    v = (
-        np.random.default_rng(3).standard_normal((len(x), 4, 3))
-        * np.geomspace(1e-3, 1e1, len(x))[:, None, None]
+    # ipctk's velocity is that of the closest points, which is the slip where both parts are only shifted.
+    v = np.repeat(np.random.default_rng(3).standard_normal((len(x), 2, 3)), (2, 3), axis=1)
+    v *= np.geomspace(1e-3, 1e1, len(x))[:, None, None]
+    at = _core.pair_frictions(
+        "edge_edge", with_corners("edge_edge", x), AREA, 0.0, LAW, v, (0.5, 0.5, 0.1), v
     )
-    at = _core.pair_frictions("edge_edge", x, AREA, 0.0, LAW, v, (0.5, 0.5, 0.1), v)
+    v = v[:, :4]
     _, weights, normals, _ = _core.pair_proximities("edge_edge", x)
     force = _core.pair_energies("edge_edge", x, AREA, 0.0, LAW)["normal_force"]
     relative_velocity = np.einsum("ni,nik->nk", weights, v)
@@ -254,19 +295,19 @@ def test_friction_is_that_of_ipctk_in_sticking_and_sliding() -> None:
         [ipctk.smooth_friction_f1_over_x(u, 0.1) for u in np.linalg.norm(tangential, axis=1)]
     )
     expected = -0.5 * (force * per_speed)[:, None, None] * weights[:, :, None] * tangential[:, None, :]
-    assert relative(at["force"], expected) < 1e-8
+    assert relative(at["force"][:, :2], expected[:, :2]) < 1e-8
 
 
 def test_static_friction_falls_to_the_kinetic_one() -> None:
-    x = np.array([[[0.2, 0.2, 0.1], [0, 0, 0], [1, 0, 0], [0, 1, 0]]], float)
-    v = np.zeros((1, 4, 3))
+    x = np.array([[[0.2, 0.2, 0.1], [0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]]], float)
+    v = np.zeros((1, 5, 3))
     shares = []
     for speed in (0.1, 1.0, 3.0, 10.0, 50.0):  # of the sticking speed
         v[0, 0, 0] = 0.02 * speed
         at = _core.pair_frictions("point_triangle", x, AREA, 0.0, LAW, v, (0.3, 0.6, 0.02), v)
         shares.append(
             -at["force"][0, 0, 0]
-            / _core.pair_energies("point_triangle", x, AREA, 0.0, LAW)["normal_force"][0]
+            / _core.pair_energies("point_triangle", x[:, :4], AREA, 0.0, LAW)["normal_force"][0]
         )
     assert shares[0] == pytest.approx(0.6 * 0.19) and shares[1] == pytest.approx(0.6)
     assert 0.3 < shares[2] < 0.6 and shares[3:] == pytest.approx([0.3, 0.3])

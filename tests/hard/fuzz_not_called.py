@@ -53,6 +53,7 @@ NOT_CALLED = {
     "LargeStrainWarning": "a warning",
     "StepErrorWarning": "a warning",
     "FieldSamplingWarning": "a warning",
+    "LinearTheoryWarning": "a warning",
     "SusceptibilityWarning": "a warning",
     "MeshGroupWarning": "a warning",
     "MeshQualityWarning": "a warning",

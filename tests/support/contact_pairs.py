@@ -3,6 +3,7 @@
 import numpy as np
 
 KINDS = ("point_triangle", "edge_edge")
+ALL_KINDS = (*KINDS, "point_edge", "point_point")
 LAW = {
     "stiffness": 2.0e3,
     "activation_distance": 0.4,
@@ -19,7 +20,7 @@ def random_pairs(kind, count, seed=0, gap=None):
     rng = np.random.default_rng(seed)
     x = rng.uniform(-1.0, 1.0, (count, 4, 3))
     if gap is not None:
-        first = 1 if kind == "point_triangle" else 2
+        first = 2 if kind == "edge_edge" else 1
         for _ in range(2):  # once more, where another corner is nearest after the first
             distances, _, normals, _ = _core.pair_proximities(kind, x)
             shift = (gap * rng.uniform(0.5, 1.5, count) - distances)[:, None] * normals
@@ -62,10 +63,10 @@ def hard_pairs(kind, gap=1e-3):
 
 
 def differences(function, x, step=1e-6):
-    """Return the derivatives (n, ..., 12) of a function of (n, 4, 3) with values (n, ...), by central differences."""
+    """Return the derivatives (n, ..., 3 m) of a function of (n, m, 3) with values (n, ...), by central differences."""
     columns = []
-    for k in range(12):
-        shift = np.zeros((4, 3))
+    for k in range(3 * x.shape[1]):
+        shift = np.zeros(x.shape[1:])
         shift.flat[k] = step
         columns.append((function(x + shift) - function(x - shift)) / (2.0 * step))
     return np.stack(columns, axis=-1)

@@ -148,6 +148,30 @@ def buckling_column() -> Kind:
     return Kind(column(), inputs, solve=buckling, reach=REACH, of_linear=True)
 
 
+def buckling_six_node_column() -> Kind:
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(4, 1), order=2)
+    sheet = ms.Shell(mesh, thickness=2e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
+    press = ms.EdgeLoad(mesh.edges_at(x=0.1), (-0.1, 0.02, 1e-3))
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[press], gravity=(-9.81, 1.0, 0))
+    return Kind(
+        scene, {"load_factor": 0.9, "gravity_factor": 0.8}, solve=buckling, reach=REACH, of_linear=True
+    )
+
+
+def buckling_solid() -> Kind:
+    """Build a nearly incompressible column, bent by its weight, that buckles about its equilibrium."""
+    block = ms.Solid(
+        ms.meshes.box((0.1, 0.02, 0.01), cells=(4, 1, 1)),
+        material=ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.45),
+        mass_density=1e3,
+    )
+    press = ms.AreaLoad((-2e3, 100.0, 50.0), faces=block.mesh.faces_at(x=0.1))
+    pin = ms.Pin(block.mesh.vertices_at(x=0.0))
+    scene = ms.Scene(block, supports=[pin], loads=[press], gravity=(-9.81, 1.0, -2.0))
+    inputs = {"load_factor": 0.9, "gravity_factor": 0.8}
+    return Kind(scene, inputs, solve=buckling_about, fixed=EXACT, step=2e-3, reach=REACH)
+
+
 def buckling_bent_column() -> Kind:
     inputs = {
         "load_factor": 0.9,
@@ -273,6 +297,8 @@ LINEAR_MAKERS = {
     "a beam that snaps at a limit point": snapping_beam,
     "a column that buckles by linear theory": buckling_column,
     "a bent column that buckles by linear theory": buckling_bent_column,
+    "a six-node column that buckles by linear theory": buckling_six_node_column,
+    "a solid column that buckles about its equilibrium": buckling_solid,
     "a sheet that responds by linear theory": lambda: responding_sheet(False),
     "a bent sheet that responds by linear theory": lambda: responding_sheet(True),
 }

@@ -38,6 +38,16 @@ class PairRows {
     Array array_;
 };
 
+// Returns the vectors of the nodes of n slip maps: (n, 5, 3).
+std::vector<SlipVectors> slip_rows(const Array& array, const char* name) {
+    if (array.ndim() != 3 || array.shape(1) != slip_nodes || array.shape(2) != 3)
+        throw InvalidInput(std::string(name) + " must have shape (n, 5, 3)");
+    std::vector<SlipVectors> rows(static_cast<std::size_t>(array.shape(0)));
+    for (py::ssize_t k = 0; k < array.shape(0); ++k)
+        for (int i = 0; i < slip_nodes; ++i) rows[k][i] = Vec3(array.data(k, i, 0));
+    return rows;
+}
+
 void copy_rows(const PairVectors& from, double* to) {
     for (const Vec3& each : from) to = std::copy_n(each.data(), 3, to);
 }
@@ -168,45 +178,59 @@ Array free_shares(const std::string& kind, const Array& from, const Array& to, d
     return shares;
 }
 
-// Returns force (n, 4, 3); by_velocity, secant, by_place (n, 12, 12); and the derivatives of lambda . force by
-// velocities and positions (n, 4, 3), normal forces (n,) and (kinetic, fixed, sticking speed) (n, 3).
+// Returns force (n, 5, 3); by_velocity, secant, by_place (n, 15, 15); slip (n, 3); and the derivatives of lambda . force by
+// velocities and positions (n, 5, 3), normal forces (n,) and (kinetic, fixed, sticking speed) (n, 3). The nodes are those of the pair, and then
+// further corners of the triangle of its second part: `places`, velocities and lambda are (n, 5, 3), zero where a pair has fewer.
 py::dict frictions(const std::string& kind, const Array& places, double area, double parallel,
                    const py::dict& law, const Array& velocities, const std::array<double, 3>& friction,
                    const Array& lambda) {
     const Pairs with = pairs_of(kind, area, parallel, law);
-    const PairRows x(places, "places [m]"), v(velocities, "velocities [m/s]"), along(lambda, "lambda");
-    const py::ssize_t n = x.count();
-    if (v.count() != n || along.count() != n)
+    const std::vector<SlipVectors> x = slip_rows(places, "places [m]"),
+                                   v = slip_rows(velocities, "velocities [m/s]"),
+                                   along = slip_rows(lambda, "lambda");
+    const py::ssize_t n = static_cast<py::ssize_t>(x.size());
+    if (v.size() != x.size() || along.size() != x.size())
         throw InvalidInput("velocities and lambda must be as many as places");
-    const auto vectors = [&] { return Array({n, py::ssize_t{4}, py::ssize_t{3}}); };
-    const auto squares = [&] { return Array({n, py::ssize_t{12}, py::ssize_t{12}}); };
+    constexpr py::ssize_t nodes = slip_nodes;
+    const auto vectors = [&] { return Array({n, nodes, py::ssize_t{3}}); };
+    const auto squares = [&] { return Array({n, 3 * nodes, 3 * nodes}); };
     Array force = vectors(), by_velocity = squares(), secant = squares(), by_place = squares(),
           along_velocity = vectors(), along_place = vectors(), along_normal_force(n),
-          along_law({n, py::ssize_t{3}});
-    using Square = Eigen::Map<Eigen::Matrix<double, 12, 12, Eigen::RowMajor>>;
+          along_law({n, py::ssize_t{3}}), slip({n, py::ssize_t{3}});
+    using Square = Eigen::Map<Eigen::Matrix<double, 3 * slip_nodes, 3 * slip_nodes, Eigen::RowMajor>>;
+    const auto copy_slip_rows = [](const SlipVectors& from, double* to) {
+        for (const Vec3& each : from) to = std::copy_n(each.data(), 3, to);
+    };
     for (py::ssize_t k = 0; k < n; ++k) {
-        const PairEnergy at(with.pair, x[k], with.law);
+        PairPositions of_pair;
+        std::copy_n(x[k].begin(), 4, of_pair.begin());
+        const PairEnergy at(with.pair, of_pair, with.law);
         if (!at.acts()) throw InvalidInput("every pair must act");
-        const PairFriction rub(at, v[k], {friction[0], friction[1], friction[2]});
-        copy_rows(rub.force(), force.mutable_data(k, 0, 0));
+        SlipStencil stencil;
+        stencil.positions = x[k];
+        stencil.count = with.pair.kind == PairKind::edge_edge ? 5 : 4;
+        stencil.corner = with.pair.kind == PairKind::edge_edge ? 2 : 1;
+        const PairFriction rub(at, stencil, v[k], {friction[0], friction[1], friction[2]});
+        copy_slip_rows(rub.force(), force.mutable_data(k, 0, 0));
+        std::copy_n(rub.slip().data(), 3, slip.mutable_data(k, 0));
         Square full(by_velocity.mutable_data(k, 0, 0)), held(secant.mutable_data(k, 0, 0)),
             placed(by_place.mutable_data(k, 0, 0));
-        std::array<Mat3, 16> blocks;
+        PairFriction::Blocks blocks;
         rub.by_position(blocks);
-        for (int i = 0; i < 4; ++i)
-            for (int j = 0; j < 4; ++j) {
+        for (int i = 0; i < slip_nodes; ++i)
+            for (int j = 0; j < slip_nodes; ++j) {
                 full.block<3, 3>(3 * i, 3 * j) = rub.by_velocity(i, j, false);
                 held.block<3, 3>(3 * i, 3 * j) = rub.by_velocity(i, j, true);
-                placed.block<3, 3>(3 * i, 3 * j) = blocks[4 * i + j];
+                placed.block<3, 3>(3 * i, 3 * j) = blocks[slip_nodes * i + j];
             }
         const PairFriction::Gradient by = rub.vjp(along[k]);
-        copy_rows(by.by_velocity, along_velocity.mutable_data(k, 0, 0));
-        copy_rows(by.by_position, along_place.mutable_data(k, 0, 0));
+        copy_slip_rows(by.by_velocity, along_velocity.mutable_data(k, 0, 0));
+        copy_slip_rows(by.by_position, along_place.mutable_data(k, 0, 0));
         along_normal_force.mutable_at(k) = by.by_normal_force;
         const double numbers[3] = {by.by_law.kinetic, by.by_law.fixed, by.by_law.sticking_speed};
         std::copy_n(numbers, 3, along_law.mutable_data(k, 0));
     }
-    return py::dict(py::arg("force") = force, py::arg("by_velocity") = by_velocity,
+    return py::dict(py::arg("force") = force, py::arg("slip") = slip, py::arg("by_velocity") = by_velocity,
                     py::arg("secant") = secant, py::arg("by_place") = by_place,
                     py::arg("along_velocity") = along_velocity, py::arg("along_place") = along_place,
                     py::arg("along_normal_force") = along_normal_force, py::arg("along_law") = along_law);

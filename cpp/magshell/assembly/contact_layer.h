@@ -30,12 +30,12 @@ class ContactLayer {
     /// Returns how often its pattern has changed; at first it couples nothing.
     std::int64_t version() const { return version_; }
 
-    /// Adds the lower blocks (i, j), i >= j, of a group that it couples: block(i, j) returns a Mat3.
-    template <class Block>
-    void add(const Group& group, const Block& block) {
-        for (int i = 0; i < 4 && group[i] >= 0; ++i) {
+    /// Adds the lower blocks (i, j), i >= j, of nodes that it couples: block(i, j) returns a Mat3.
+    template <std::size_t count, class Block>
+    void add(const std::array<Index, count>& group, const Block& block) {
+        for (std::size_t i = 0; i < count && group[i] >= 0; ++i) {
             matrix_.add_diagonal_block(group[i], block(i, i));
-            for (int j = 0; j < i; ++j) {
+            for (std::size_t j = 0; j < i; ++j) {
                 const SystemMatrix::Slot slot = matrix_.node_slot(group[i], group[j]);
                 matrix_.add_block(slot, matrix_.column_length(group[slot & 1 ? i : j]), block(i, j));
             }

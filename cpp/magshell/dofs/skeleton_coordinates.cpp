@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "magshell/core/rotation_vector.h"
@@ -34,10 +35,20 @@ std::vector<Index> nodes_of(const std::vector<RigidNodes>& links) {
     return all;
 }
 
-// Returns the factorization that solves for the minimum-norm least-squares solution, because the rows may not determine all coordinates.
-auto solver_of(const MatrixXd& rows) {
-    return rows.completeOrthogonalDecomposition();
-}
+// Solves for the minimum-norm least-squares solution, because the rows may not determine all coordinates, of which there may be none: Eigen
+// does not decompose matrices without columns.
+class LeastSquares {
+  public:
+    explicit LeastSquares(const MatrixXd& rows) {
+        if (rows.cols() > 0) factor_ = rows.completeOrthogonalDecomposition();
+    }
+    VectorXd solve(const VectorXd& wanted) const {
+        return factor_ ? VectorXd(factor_->solve(wanted)) : VectorXd();
+    }
+
+  private:
+    std::optional<Eigen::CompleteOrthogonalDecomposition<MatrixXd>> factor_;
+};
 
 }  // namespace
 
@@ -295,13 +306,13 @@ void SkeletonCoordinates::project_state(VectorXd& q, VectorXd* v) const {
         const VectorXd off = given - leading(gather(q));
         if (!(off.norm() < before)) break;
         before = off.norm();
-        const VectorXd z = solver_of(leading(jacobian(q))).solve(off);
+        const VectorXd z = LeastSquares(leading(jacobian(q))).solve(off);
         if (!(z.norm() > fit_tolerance * links_.front().length())) break;
         retract(q, z);
     }
     if (!v) return;
     const MatrixXd b = jacobian(q);
-    scatter(b * solver_of(leading(b)).solve(leading(gather(*v))), *v);
+    scatter(b * LeastSquares(leading(b)).solve(leading(gather(*v))), *v);
 }
 
 // With B_l and v_l the rows of the leading nodes, project_state() returns v = B z with z = B_l^+ v_l (pseudoinverse). B depends on the
@@ -309,7 +320,7 @@ void SkeletonCoordinates::project_state(VectorXd& q, VectorXd* v) const {
 void SkeletonCoordinates::project_state_vjp(const VectorXd& q, const VectorXd& v, VectorXd& by_q,
                                             VectorXd& by_v, Gradient& out, VectorXd* by_rest) const {
     const MatrixXd b = jacobian(q), led = leading(b);
-    const auto inverse = solver_of(MatrixXd(led.transpose() * led));
+    const LeastSquares inverse(led.transpose() * led);
     VectorXd by_pose = b.transpose() * gather(by_q);
     const VectorXd nothing = VectorXd::Zero(3 * nodes().size());
     VectorXd rates = VectorXd::Zero(coordinates_), apart = VectorXd::Zero(q.size()), by_state = apart;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "magshell/terms/actuator/muscle_rate_term.h"
 
@@ -82,7 +83,9 @@ class MuscleEnergy final : public MuscleTerm {
                 const FibreLaw::Response law = fibres_->law.at(at.length, each.activation);
                 stiffness_[group].along[p] = law.slope;
                 stiffness_[group].across[p] = at.over_length(law);
-                const SimdVec3 pull = (each.volume[p] * each.strength * law.tension) * at.n;
+                stiffness_[group].y[p] = at.y;
+                SimdVec3 pull = (each.volume[p] * each.strength * law.tension) * at.n;
+                if (frozen_) pull = (each.volume[p] * each.strength * (*frozen_)[group].at[p]) * at.y;
                 add_pulls<N>(each.m[p], pull, p == 0, g);
             }
             loop_.scatter(group, g, out);
@@ -98,6 +101,7 @@ class MuscleEnergy final : public MuscleTerm {
             Symmetric3 stiffness[points];
             for (int p = 0; p < points; ++p) {
                 SimdDouble along = stiffness_[group].along[p], across = stiffness_[group].across[p];
+                if (frozen_) along = across = (*frozen_)[group].at[p];
                 if (psd_projection_) {
                     along = max(along, SimdDouble(0.0));
                     across = max(across, SimdDouble(0.0));
@@ -172,6 +176,28 @@ class MuscleEnergy final : public MuscleTerm {
         }
     }
 
+    // The strain is l^2/2, whose stress is T/l. Its second derivative is the same at all states.
+    void freeze_stress_rates(const double* p) override {
+        std::vector<StressRates> rates(loop_.groups());
+        loop_.each_group([&](Index group) {
+            SimdVec3 moves[N];
+            if (p) loop_.gather(group, p, moves);
+            for (int k = 0; k < points; ++k) {
+                SimdDouble& rate = rates[group].at[k];
+                rate = SimdDouble(0.0);
+                const Stiffness& now = stiffness_[group];
+                const DeformedFibre at(now.y[k]);
+                if (p)
+                    rate = (now.along[k] - now.across[k]) * at.inverse * at.inverse *
+                           dot(at.y, fibres_->at(group).m[k].at(moves));
+            }
+        });
+        frozen_ = std::move(rates);
+    }
+    void release_stresses() override { frozen_.reset(); }
+    // Returns true if T/l does not depend on the state, so that the rates are zero.
+    bool has_stress_work_vjp() const override { return fibres_->law.form == FibreForm::active_stress; }
+
     FibreStates states(const double* q, const double* v) const override {
         const std::size_t count = static_cast<std::size_t>(fibres_->fibres.n_elements()) * points;
         FibreStates out{points, std::vector<double>(count), std::vector<double>(count),
@@ -206,9 +232,14 @@ class MuscleEnergy final : public MuscleTerm {
     std::size_t bytes() const override { return fibres_->bytes() + bytes_of(stiffness_); }
 
   private:
-    // At the last evaluated state: T' and T/l.
+    // At the last evaluated state: T', T/l and the vector F m of the fibre.
     struct Stiffness {
         SimdDouble along[points], across[points];
+        SimdVec3 y[points];
+    };
+    // Rates of T/l.
+    struct StressRates {
+        SimdDouble at[points];
     };
 
     // The power of a point along a motion, with its derivatives with respect to F m and to the rate of F m.
@@ -258,6 +289,7 @@ class MuscleEnergy final : public MuscleTerm {
     double largest_rate_ = 0.0;
     bool psd_projection_ = false;
     std::vector<Stiffness> stiffness_;
+    std::optional<std::vector<StressRates>> frozen_;
 };
 
 template <class Element>

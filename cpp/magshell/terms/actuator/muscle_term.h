@@ -7,6 +7,7 @@
 #include "magshell/terms/actuator/muscle_fibres.h"
 #include "magshell/terms/force_term.h"
 #include "magshell/terms/rest_shape_term.h"
+#include "magshell/terms/stress_rate_term.h"
 #include "magshell/terms/term.h"
 
 namespace magshell {
@@ -19,7 +20,7 @@ struct FibreStates {
     std::vector<double> volumes;    // reference volumes [m3]
 };
 
-class MuscleTerm : public Term, public RestShapeTerm {
+class MuscleTerm : public Term, public RestShapeTerm, public StressRateTerm {
   public:
     std::string_view name() const final { return "muscle"; }
     /// Returns stretches and tensions at q. v: velocities of all degrees of freedom [m/s]; nullptr at rest.

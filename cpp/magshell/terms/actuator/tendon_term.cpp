@@ -147,7 +147,8 @@ void TendonTerm::evaluate(const double* q, const LoadParameters& load_parameters
         each.stiffness = pull.stiffness;
         for (std::size_t k = 0; k < each.nodes.size(); ++k)
             for (int axis = 0; axis < 3; ++axis)
-                out.add(3 * each.nodes[k] + axis, factor * pull.tension * each.slopes[k][axis]);
+                out.add(3 * each.nodes[k] + axis,
+                        (factor * pull.tension + each.frozen_rate) * each.slopes[k][axis]);
     }
 }
 
@@ -156,11 +157,20 @@ void TendonTerm::extrapolate(const double* p) {
         each.extrapolated = std::max(0.0, each.tension + each.stiffness * each.along(p));
 }
 
+void TendonTerm::freeze_stress_rates(const double* p) {
+    for (String& each : strings_) each.frozen_rate = p ? factor_now_ * each.stiffness * each.along(p) : 0.0;
+}
+
+bool TendonTerm::has_stress_work_vjp() const {
+    return std::all_of(tendons_.begin(), tendons_.end(),
+                       [](const Tendon& each) { return each.numbers[1] == 0.0; });
+}
+
 void TendonTerm::finish_assembly(const double* q, const LoadParameters& load_parameters,
                                  SystemMatrix& out) const {
     const double factor = load_parameters[factor_.first];
     for (const String& each : strings_) {
-        const double tension = factor * (extrapolated_ ? each.extrapolated : each.tension);
+        const double tension = factor * (extrapolated_ ? each.extrapolated : each.tension) + each.frozen_rate;
         if (tension == 0.0) continue;
         for (const Segment& segment : each.segments) {
             const Vec3 span = each.span(segment, q);

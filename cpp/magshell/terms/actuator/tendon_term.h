@@ -15,6 +15,7 @@
 #include "magshell/body/nodes.h"
 #include "magshell/terms/low_rank_term.h"
 #include "magshell/terms/rest_shape_term.h"
+#include "magshell/terms/stress_rate_term.h"
 
 namespace magshell {
 
@@ -33,7 +34,7 @@ struct TendonInput {
     std::vector<double> shares;
 };
 
-class TendonTerm final : public LowRankTerm, public RestShapeTerm {
+class TendonTerm final : public LowRankTerm, public RestShapeTerm, public StressRateTerm {
   public:
     TendonTerm(const std::vector<TendonInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                Registry& registry);
@@ -51,6 +52,11 @@ class TendonTerm final : public LowRankTerm, public RestShapeTerm {
              Gradient& out) override;
     void add_rest_vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
                       VectorXd& out) override;
+    /// Adds the rates of the forces factor T to these forces, which depend on loads.
+    void freeze_stress_rates(const double* p) override;
+    void release_stresses() override { freeze_stress_rates(nullptr); }
+    /// Returns true if no tendon is elastic, so that the rates are zero.
+    bool has_stress_work_vjp() const override;
     std::size_t bytes() const override;
 
   private:
@@ -69,6 +75,7 @@ class TendonTerm final : public LowRankTerm, public RestShapeTerm {
         // Values at the last evaluated state.
         double length = 0.0, tension = 0.0, stiffness = 0.0, extrapolated = 0.0;
         std::vector<Vec3> slopes;  // dL/dx
+        double frozen_rate = 0.0;    // [N] of factor T, while stresses are held at their rates
 
         Vec3 span(const Segment& segment, const double* q) const;
         double length_at(const double* q) const;

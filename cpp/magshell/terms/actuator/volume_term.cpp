@@ -195,7 +195,7 @@ void VolumeTerm::evaluate(const double* q, const LoadParameters& load_parameters
         each.magnitude = law.magnitude;
         for (std::size_t k = 0; k < x.size(); ++k)
             for (int axis = 0; axis < 3; ++axis)
-                out.add(3 * each.nodes[k] + axis, law.slope * each.slopes[k][axis]);
+                out.add(3 * each.nodes[k] + axis, (law.slope + each.frozen_rate) * each.slopes[k][axis]);
     }
 }
 
@@ -203,12 +203,21 @@ void VolumeTerm::extrapolate(const double* p) {
     for (Volume& each : volumes_) each.extrapolated = each.slope + each.curvature * each.along(p);
 }
 
+void VolumeTerm::freeze_stress_rates(const double* p) {
+    for (Volume& each : volumes_) each.frozen_rate = p ? each.curvature * each.along(p) : 0.0;
+}
+
+bool VolumeTerm::has_stress_work_vjp() const {
+    return std::all_of(volumes_.begin(), volumes_.end(),
+                       [](const Volume& each) { return each.law == VolumeLaw::pressure; });
+}
+
 void VolumeTerm::finish_assembly(const double* q, const LoadParameters&, SystemMatrix& out) const {
     for (const Volume& each : volumes_) {
         const std::vector<Vec3> x = each.at(q);
         const double own =
             positive_definite_ && has_target_volume(each.law) && each.pairs.empty() ? 0.0 : each.slope;
-        const double slope = extrapolated_ ? each.extrapolated : own;
+        const double slope = (extrapolated_ ? each.extrapolated : own) + each.frozen_rate;
         if (slope == 0.0 && each.curvature == 0.0) continue;
         const auto add_faces = [&]<int N>(const std::vector<Face<N>>& faces) {
             for (const Face<N>& face : faces) {

@@ -18,6 +18,7 @@
 #include "magshell/energy/volume_law.h"
 #include "magshell/terms/low_rank_term.h"
 #include "magshell/terms/rest_shape_term.h"
+#include "magshell/terms/stress_rate_term.h"
 
 namespace magshell {
 
@@ -37,7 +38,7 @@ struct VolumeInput {
     std::vector<ClosedSurface> surfaces;
 };
 
-class VolumeTerm final : public LowRankTerm, public RestShapeTerm {
+class VolumeTerm final : public LowRankTerm, public RestShapeTerm, public StressRateTerm {
   public:
     VolumeTerm(const std::vector<VolumeInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                Registry& registry);
@@ -58,6 +59,11 @@ class VolumeTerm final : public LowRankTerm, public RestShapeTerm {
              Gradient& out) override;
     void add_rest_vjp(const double*, const LoadParameters& load_parameters, const double* lambda,
                       VectorXd& out) override;
+    /// Adds the rates of dE/dV to dE/dV, which depends on loads.
+    void freeze_stress_rates(const double* p) override;
+    void release_stresses() override { freeze_stress_rates(nullptr); }
+    /// Returns true if all pressures are given, so that the rates are zero.
+    bool has_stress_work_vjp() const override;
     std::size_t bytes() const override;
 
   private:
@@ -82,6 +88,7 @@ class VolumeTerm final : public LowRankTerm, public RestShapeTerm {
         // Values at the last evaluated state.
         double volume = 0.0, slope = 0.0, curvature = 0.0, magnitude = 0.0, extrapolated = 0.0;
         std::vector<Vec3> slopes;  // dV/dx
+        double frozen_rate = 0.0;    // [Pa] of dE/dV, while stresses are held at their rates
 
         /// Returns the positions relative to the first node: the volume does not depend on the origin, and no
         /// digits are lost far from it.

@@ -38,6 +38,7 @@ BodyContactTerm::BodyContactTerm(const Nodes& nodes, const std::vector<ContactSu
                            number("friction_coefficient", "1"), number("static_friction_coefficient", "1"),
                            number("sticking_speed", "m/s")});
         laws_[c].penalty = contacts[c].penalty;
+        has_friction_.push_back(contacts[c].has_friction);
     }
 }
 
@@ -87,7 +88,9 @@ BodyContactTerm::ActiveContacts BodyContactTerm::found(const double* q) const {
             if (!pair.acts()) continue;
             double far = 0.0;
             for (int i = 0; i < pair.count(); ++i) far = std::max(far, x[i].lpNorm<Eigen::Infinity>());
-            parts_[block].push_back({near[k], pair, far});
+            parts_[block].push_back(
+                {near[k], pair, far,
+                 has_friction_[near[k].contact] ? slip_stencil(near[k], q) : SlipStencil()});
         }
     });
     // Reuses the memory of the oldest result: fresh memory costs page faults.
@@ -102,6 +105,12 @@ BodyContactTerm::ActiveContacts BodyContactTerm::found(const double* q) const {
         all->insert(all->end(), parts_[block].begin(), parts_[block].end());
     found_.push_front({std::move(at), std::move(all)});
     return found_.front().active_contacts;
+}
+
+SlipStencil BodyContactTerm::slip_stencil(const NearPair& near, const double* q) const {
+    const SurfacePair& surfaces = candidates_.phase().contacts()[near.contact];
+    const ContactSurface& second = candidates_.phase().surfaces()[near.swapped ? surfaces.a : surfaces.b];
+    return {near.pair, second.faces[near.second_face], q};
 }
 
 double BodyContactTerm::slope(const std::vector<ActiveContact>& active_contacts, const double* p) {
@@ -198,7 +207,11 @@ void BodyContactTerm::evaluate(const double* q, const LoadParameters&, Residual&
 
 void BodyContactTerm::set_extra_couplings(const std::vector<ActiveContact>& active_contacts) {
     extra_couplings_.clear();
-    for (const ActiveContact& active : active_contacts) extra_couplings_.push_back(active.near.pair.nodes);
+    for (const ActiveContact& active : active_contacts) {
+        extra_couplings_.push_back(active.near.pair.nodes);
+        if (const ContactLayer::Group further = active.slip.further_couplings(); further[0] >= 0)
+            extra_couplings_.push_back(further);
+    }
 }
 
 void BodyContactTerm::prepare_assembly(const double* q, const LoadParameters&) {
@@ -217,6 +230,9 @@ void BodyContactTerm::prepare_assembly(const double* q, const LoadParameters&) {
         (candidates_.covers_all_candidates(coupled_margin_) ||
          std::all_of(evaluated_contacts().begin(), evaluated_contacts().end(),
                      [&](const ActiveContact& active) { return layer_.couples(active.near.pair.nodes); })) &&
+        std::all_of(
+            evaluated_contacts().begin(), evaluated_contacts().end(),
+            [&](const ActiveContact& active) { return layer_.couples(active.slip.further_couplings()); }) &&
         std::all_of(extra_couplings_.begin(), extra_couplings_.end(),
                     [&](const ContactLayer::Group& group) { return layer_.couples(group); });
     if (!coupled) {
@@ -225,7 +241,13 @@ void BodyContactTerm::prepare_assembly(const double* q, const LoadParameters&) {
         std::vector<ContactLayer::Group> groups = extra_couplings_;
         coupled_margin_ = candidates_.margin_ahead(ahead_);
         for (std::size_t k = 0; k < near.size(); ++k)
-            if (candidates_.may_be_active(k, coupled_margin_)) groups.push_back(near[k].pair.nodes);
+            if (candidates_.may_be_active(k, coupled_margin_)) {
+                groups.push_back(near[k].pair.nodes);
+                if (!has_friction_[near[k].contact] || near[k].pair.kind != PairKind::edge_edge) continue;
+                if (const ContactLayer::Group further = slip_stencil(near[k], q).further_couplings();
+                    further[0] >= 0)
+                    groups.push_back(further);
+            }
         layer_.add_couplings(std::move(groups));
     }
 }

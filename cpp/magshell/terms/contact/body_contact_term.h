@@ -15,6 +15,7 @@
 
 #include "magshell/assembly/contact_layer.h"
 #include "magshell/contact/contact_rest.h"
+#include "magshell/contact/slip_map.h"
 #include "magshell/force/friction.h"
 #include "magshell/terms/contact/contact_candidates.h"
 #include "magshell/terms/contact/pair_stiffness.h"
@@ -29,7 +30,8 @@ class BodyContactTerm final : public Term, public RestShapeTerm {
     struct ActiveContact {
         NearPair near;
         PairEnergy at;
-        double far;  // [m] its largest coordinate
+        double far;        // [m] its largest coordinate
+        SlipStencil slip;  // without nodes if the contact has no friction
     };
 
     /// Creates the term. Its Hessian is added to `layer`, not to the system matrix.
@@ -78,6 +80,8 @@ class BodyContactTerm final : public Term, public RestShapeTerm {
     std::pair<double, std::string> nearest_neighbours(Index contact) const;
     std::size_t n_contacts() const { return laws_.size(); }
     const FrictionLaw& friction(const ActiveContact& active) const { return friction_[active.near.contact]; }
+    /// Returns the nodes whose velocities are the slip of a pair.
+    SlipStencil slip_stencil(const NearPair& near, const double* q) const;
 
     /// Names the faces that limit a step p from q.
     std::string blocking(const double* q, const double* p) const;
@@ -159,6 +163,7 @@ class BodyContactTerm final : public Term, public RestShapeTerm {
     std::vector<double> stiffness_;  // [Pa] of each contact, without the factor
     std::vector<FrictionLaw> friction_;
     std::vector<double> least_;  // minimum separation of each contact [m]
+    std::vector<bool> has_friction_;
     mutable ContactCandidates candidates_;
     ContactLayer& layer_;
     mutable std::deque<FoundAt> found_;                      // the last few results

@@ -22,11 +22,11 @@ void BodyFrictionTerm::evaluate(const Kinematics& at, const LoadParameters&, Res
                          law.fixed *= factor;
                          friction_contacts_.push_back(
                              {&active, lagged, factor,
-                              PairFriction(active.at, positions_of(active.near.pair, at.v.data()), law)});
-                         const PairVectors force = friction_contacts_.back().friction.force();
-                         for (int k = 0; k < active.at.count(); ++k)
+                              PairFriction(active.at, active.slip, active.slip.of(at.v.data()), law)});
+                         const SlipVectors force = friction_contacts_.back().friction.force();
+                         for (int k = 0; k < active.slip.count; ++k)
                              for (int axis = 0; axis < 3; ++axis)
-                                 out.add(3 * active.near.pair.nodes[k] + axis, -force[k][axis]);
+                                 out.add(3 * active.slip.nodes[k] + axis, -force[k][axis]);
                      });
 }
 
@@ -38,15 +38,30 @@ void BodyFrictionTerm::set_frozen(bool frozen) {
 void BodyFrictionTerm::assemble(const Kinematics& at, const LoadParameters&, bool positive_definite,
                                 SystemMatrix&, NonsymmetricTangent& rest) const {
     for (const FrictionContact& each : friction_contacts_) {
-        const std::array<Index, 4>& nodes = each.active->near.pair.nodes;
+        const std::array<Index, slip_nodes>& nodes = each.active->slip.nodes;
         contact_.layer().add(nodes, [&](int i, int j) -> Mat3 {
             return -at.rate * each.friction.by_velocity(i, j, positive_definite);
         });
         if (each.lagged || contacts_.frozen()) continue;
-        NonsymmetricTangent::PairBlock& pair = rest.append_pair();
-        pair.nodes = nodes;
-        each.friction.by_position(pair.blocks);
-        for (Mat3& block : pair.blocks) block *= -1.0;
+        PairFriction::Blocks blocks;
+        each.friction.by_position(blocks);
+        const auto add = [&](const std::array<int, 4>& places, const auto& wanted) {
+            NonsymmetricTangent::PairBlock& pair = rest.append_pair();
+            for (int i = 0; i < 4; ++i) {
+                pair.nodes[i] = places[i] < 0 ? -1 : nodes[places[i]];
+                for (int j = 0; j < 4; ++j) {
+                    Mat3& block = pair.blocks[4 * i + j];
+                    block.setZero();
+                    if (places[i] >= 0 && places[j] >= 0 && wanted(places[i], places[j]))
+                        block = -blocks[slip_nodes * places[i] + places[j]];
+                }
+            }
+        };
+        add({0, 1, 2, 3}, [](int, int) { return true; });
+        if (nodes[4] < 0) continue;
+        const auto with_last = [](int i, int j) { return i == 4 || j == 4; };
+        add({4, 0, 1, 2}, with_last);
+        add({4, 3, -1, -1}, [&](int i, int j) { return with_last(i, j) && i != j; });
     }
 }
 
@@ -60,9 +75,9 @@ void BodyFrictionTerm::vjp(const Kinematics&, const LoadParameters&, const Vecto
                            KinematicsGradient& by, Gradient& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const ActiveContact& active = *each.active;
-        const PairFriction::Gradient of = each.friction.vjp(positions_of(active.near.pair, lambda.data()));
-        for (int k = 0; k < active.at.count(); ++k) {
-            const Index first = 3 * active.near.pair.nodes[k];
+        const PairFriction::Gradient of = each.friction.vjp(active.slip.of(lambda.data()));
+        for (int k = 0; k < active.slip.count; ++k) {
+            const Index first = 3 * active.slip.nodes[k];
             by.velocity.segment<3>(first) += of.by_velocity[k];
             if (each.lagged) by.begin.segment<3>(first) += of.by_position[k];
         }
@@ -78,7 +93,7 @@ void BodyFrictionTerm::add_rest_vjp(const Kinematics&, const VectorXd& lambda, V
     ContactRest by_rest = contact_.rest_gradient();
     for (const FrictionContact& each : friction_contacts_) {
         const ActiveContact& active = *each.active;
-        const PairFriction::Gradient of = each.friction.vjp(positions_of(active.near.pair, lambda.data()));
+        const PairFriction::Gradient of = each.friction.vjp(active.slip.of(lambda.data()));
         by_rest.add(active.near, active.at.pair_vjp(no_motion, -of.by_normal_force));
     }
     by_rest.add_to(out);
@@ -87,10 +102,8 @@ void BodyFrictionTerm::add_rest_vjp(const Kinematics&, const VectorXd& lambda, V
 void BodyFrictionTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
     for (const FrictionContact& each : friction_contacts_) {
         const double stiffness = at.rate * each.friction.friction().by_velocity.norm() * each.active->far;
-        const Proximity& near = each.active->at.near();
-        for (int k = 0; k < each.active->at.count(); ++k)
-            out.segment<3>(3 * each.active->near.pair.nodes[k]).array() +=
-                std::abs(near.weights[k]) * stiffness;
+        for (int k = 0; k < each.friction.count(); ++k)
+            out.segment<3>(3 * each.active->slip.nodes[k]).array() += each.friction.map(k).norm() * stiffness;
     }
 }
 

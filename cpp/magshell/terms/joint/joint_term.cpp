@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "magshell/core/rotation_vector.h"
 
@@ -23,7 +24,7 @@ const JointLaw::Names& names_of(const Joint& joint, JointTerm::Act act) {
 
 JointTerm::JointTerm(const std::vector<Input>& joints, const std::vector<Vec3>& rest,
                      const SystemMatrix& matrix, Registry& registry)
-    : last_turn_(joints.size(), 0.0) {
+    : last_turn_(joints.size(), 0.0), slopes_(joints.size()) {
     for (const Input& input : joints) {
         Each& each = each_.emplace_back();
         const Joint& joint = each.joint = input.joint;
@@ -145,28 +146,43 @@ void JointTerm::evaluate(const double* q, const LoadParameters&, Residual& out) 
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Each& each = each_[k];
         if (each.act == Act::closure) {
-            const Vec3 pull = each.stiffness * gap(each, each.links.positions(q));
+            const Vec3 pull = frozen_ ? (*frozen_)[k].pull : each.stiffness * gap(each, each.links.positions(q));
             each.links.scatter(pull * each.gap.weights.transpose(), out);
             continue;
         }
         const State now = state(k, q);
         if (each.form.angle() && std::isfinite(now.coordinate)) last_turn_[k] = now.coordinate;
-        each.links.scatter(now.by_first * now.form.first, out);
+        slopes_[k] = {now.form.first, now.by_second};
+        each.links.scatter((frozen_ ? (*frozen_)[k].by_first : now.by_first) * now.form.first, out);
     }
+}
+
+void JointTerm::freeze_stress_rates(const double* p) {
+    std::vector<FrozenRate> rates(each_.size());
+    for (std::size_t k = 0; k < each_.size() && p; ++k) {
+        const Corners moved = each_[k].links.gather(p);
+        if (each_[k].act == Act::closure)
+            rates[k].pull = each_[k].stiffness * (moved * each_[k].gap.weights);
+        else
+            rates[k].by_first = slopes_[k].by_second * CornerForm::inner(slopes_[k].first, moved);
+    }
+    frozen_ = std::move(rates);
 }
 
 void JointTerm::finish_assembly(const double* q, const LoadParameters&, SystemMatrix& out) const {
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Each& each = each_[k];
         if (each.act == Act::closure) {
+            if (frozen_) continue;
             const Corners none = Corners::Zero();
             each.links.add(each.stiffness * each.gap.weights * each.gap.weights.transpose(), none, 0.0, none,
                            0.0, out);
             continue;
         }
         const State now = state(k, q);
-        each.links.add(now.by_first * now.form.pairs, now.form.first, now.by_second, now.form.other,
-                       now.by_first * now.form.cross, out);
+        const double by_first = frozen_ ? (*frozen_)[k].by_first : now.by_first;
+        each.links.add(by_first * now.form.pairs, now.form.first, frozen_ ? 0.0 : now.by_second, now.form.other,
+                       by_first * now.form.cross, out);
     }
 }
 

@@ -8,16 +8,18 @@
 // o_p|^2.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "magshell/energy/joint_law.h"
 #include "magshell/terms/joint/joint_form.h"
+#include "magshell/terms/stress_rate_term.h"
 #include "magshell/terms/term.h"
 
 namespace magshell {
 
-class JointTerm final : public Term {
+class JointTerm final : public Term, public StressRateTerm {
   public:
     enum class Act { coordinate, ball_servo, cone, closure };
     struct Input {
@@ -41,6 +43,8 @@ class JointTerm final : public Term {
     void add_cancelling_forces(double beyond, VectorXd& out) const override;
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
+    void freeze_stress_rates(const double* p) override;
+    void release_stresses() override { frozen_.reset(); }
     std::vector<double> angle_branches() const override { return last_turn_; }
     void set_angle_branches(const std::vector<double>& angle_branches) override {
         last_turn_ = angle_branches;
@@ -86,6 +90,18 @@ class JointTerm final : public Term {
 
     std::vector<Each> each_;
     std::vector<double> last_turn_;
+    // At the last evaluated state: the derivatives of the form of each joint, and E'' by it.
+    struct Slope {
+        CornerForm::Corners first = CornerForm::Corners::Zero();
+        double by_second = 0.0;
+    };
+    std::vector<Slope> slopes_;
+    // While stresses are held at their rates: those of dE/d(form) of each joint, and of the force of a loop closure.
+    struct FrozenRate {
+        double by_first = 0.0;
+        Vec3 pull = Vec3::Zero();
+    };
+    std::optional<std::vector<FrozenRate>> frozen_;
 };
 
 }  // namespace magshell

@@ -114,7 +114,7 @@ SpringTerm::Local SpringTerm::local(const Spring& spring, const Vec3& along) {
 
 double SpringTerm::force(std::size_t k) const {
     const Spring& spring = springs_[k];
-    return spring.stiffness * (now_[k].value - spring.rest_length) + spring.damping * viscous_strain(k);
+    return spring.stiffness * stretch(k) + spring.damping * viscous_strain(k);
 }
 
 // The part along the spring is never negative. The part across it is the force times the curvature of the length, which is positive
@@ -199,8 +199,9 @@ void SpringTerm::vjp(const double*, const LoadParameters&, const double* lambda,
         const Spring& spring = springs_[k];
         const Vec3 moved = spring.weighted(lambda);
         const double rate = now_[k].slope.dot(moved);
-        out.values[spring.stiffness_of.at()] += spring.share * (now_[k].value - spring.rest_length) * rate;
-        if (spring.rest_length_of.exists()) out.values[spring.rest_length_of.at()] -= spring.stiffness * rate;
+        out.values[spring.stiffness_of.at()] += spring.share * stretch(k) * rate;
+        if (spring.rest_length_of.exists() && !frozen_)
+            out.values[spring.rest_length_of.at()] -= spring.stiffness * rate;
         if (spring.damping_of.exists())
             out.values[spring.damping_of.at()] += spring.share * viscous_strain(k) * rate;
         if (spring.ground_of.exists())
@@ -243,6 +244,15 @@ Strains SpringTerm::stresses(const Strains& strains) const {
 
 void SpringTerm::add_forces(const Strains& stresses, Residual& out) {
     for (Index k = 0; k < elements(); ++k) scatter(springs_[k], stresses.number(k, 0) * now_[k].slope, out);
+}
+
+// W = k (s - r) c; the stiffness, and the share of a place in it, are counted at fixed strain rates.
+void SpringTerm::add_stress_work_vjp(const double*, const Strains& curvatures, Residual& by_q, Gradient& out,
+                                     VectorXd*) {
+    Strains weights(elements(), 1);
+    for (Index k = 0; k < elements(); ++k) weights.set(k, 0, springs_[k].stiffness * curvatures.number(k, 0));
+    add_forces(weights, by_q);
+    strains_vjp(weights, out);
 }
 
 Strains SpringTerm::rates(const double* q, const double* v) const {

@@ -10,6 +10,7 @@
 // The load factor does not scale them.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "magshell/body/nodes.h"
@@ -18,7 +19,7 @@
 
 namespace magshell {
 
-class SpringTerm final : public DampedTerm {
+class SpringTerm final : public DampedTerm, public StressRateTerm {
   public:
     SpringTerm(const std::vector<SpringsInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                Registry& registry);
@@ -46,6 +47,12 @@ class SpringTerm final : public DampedTerm {
     Strains stresses(const Strains& strains) const override;
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
+
+    void freeze_stress_rates(const double* p) override { frozen_ = p ? strain_rates(p) : Strains(elements(), 1); }
+    void release_stresses() override { frozen_.reset(); }
+    bool has_stress_work_vjp() const override { return true; }
+    void add_stress_work_vjp(const double* q, const Strains& curvatures, Residual& by_q, Gradient& out,
+                             VectorXd* by_rest) override;
 
     Strains rates(const double* q, const double* v) const override;
     void rates_vjp(const double* q, const double* v, const Strains& by_rates, VectorXd& by_q, VectorXd& by_v,
@@ -93,7 +100,11 @@ class SpringTerm final : public DampedTerm {
     /// Returns the force [N] and stiffness [N/m] along the spring at the last evaluated state.
     double force(std::size_t k) const;
     double stiffness(std::size_t k) const {
-        return springs_[k].stiffness + viscous_scale() * springs_[k].damping;
+        return frozen_ ? 0.0 : springs_[k].stiffness + viscous_scale() * springs_[k].damping;
+    }
+    /// Returns s - r, or the rate of s that is held.
+    double stretch(std::size_t k) const {
+        return frozen_ ? frozen_->number(static_cast<Index>(k), 0) : now_[k].value - springs_[k].rest_length;
     }
     Mat3 hessian(std::size_t k, bool project_psd) const;
     static void scatter(const Spring& spring, const Vec3& force, Residual& out);
@@ -101,7 +112,8 @@ class SpringTerm final : public DampedTerm {
     static void add_cancelling(const Spring& spring, double stiffness, double beyond, VectorXd& out);
 
     std::vector<Spring> springs_;
-    std::vector<Local> now_;  // at the last evaluated state
+    std::vector<Local> now_;       // at the last evaluated state
+    std::optional<Strains> frozen_;  // rates of s while forces are held at their rates
     bool has_lengths_ = false, is_damped_ = false, psd_projection_ = false;
 };
 

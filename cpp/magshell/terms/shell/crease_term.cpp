@@ -83,10 +83,11 @@ double CreaseTerm::energy(const double* q, const LoadParameters&) const {
 }
 
 void CreaseTerm::evaluate(const double* q, const LoadParameters&, Residual& out) {
+    state_.assign(q, q + 3 * nodes_.n_nodes());
     for (std::size_t k = 0; k < edges_.size(); ++k) {
         const Edge& edge = edges_[k];
         unwrapped_angles_[k] = unwrapped_angle(q, k);
-        const SimdDouble moment(edge.stiffness * (unwrapped_angles_[k] - edge.rest_angle));
+        const SimdDouble moment(edge.stiffness * turned(k));
         SimdVec3 g[4];
         fold_at(edge.nodes, q).gradient(g);
         for (int node = 0; node < 4; ++node) scatter_node(out, edge.nodes[node], moment * g[node], 0);
@@ -98,12 +99,12 @@ void CreaseTerm::finish_assembly(const double* q, const LoadParameters&, SystemM
     for (std::size_t k = 0; k < edges_.size(); ++k) {
         const Edge& edge = edges_[k];
         const DihedralAngle fold = fold_at(edge.nodes, q);
-        const double moment = edge.stiffness * (unwrapped_angles_[k] - edge.rest_angle);
+        const double moment = edge.stiffness * turned(k);
         const DihedralHessian curvature(fold, SimdDouble(psd_projection_ ? 0.0 : moment));
         SimdVec3 g[4];
         fold.gradient(g);
         SimdMat3 h[DihedralHessian::count];
-        const SimdDouble stiffness(edge.stiffness);
+        const SimdDouble stiffness(frozen_ ? 0.0 : edge.stiffness);
         for (int row = 0; row < 4; ++row)
             for (int column = 0; column <= row; ++column) {
                 SimdMat3& block = h[lower_index(row, column)];
@@ -137,10 +138,31 @@ void CreaseTerm::vjp(const double* q, const LoadParameters&, const double* lambd
     for (std::size_t k = 0; k < edges_.size(); ++k) {
         const Edge& edge = edges_[k];
         const double rate = this->rate(edge, q, lambda);
-        out.values[edge.stiffness_of.at(edge.row_of(edge.stiffness_of))] +=
-            edge.length * (unwrapped_angles_[k] - edge.rest_angle) * rate;
-        if (edge.angle_of.rows > 0)
+        out.values[edge.stiffness_of.at(edge.row_of(edge.stiffness_of))] += edge.length * turned(k) * rate;
+        if (edge.angle_of.rows > 0 && !frozen_)
             out.values[edge.angle_of.at(edge.row_of(edge.angle_of))] -= edge.stiffness * rate;
+    }
+}
+
+void CreaseTerm::freeze_stress_rates(const double* p) {
+    frozen_ = p ? strain_rates(p) : Strains(static_cast<Index>(edges_.size()), 1);
+}
+
+Strains CreaseTerm::strain_rates(const double* p) {
+    Strains rates(static_cast<Index>(edges_.size()), 1);
+    for (std::size_t k = 0; k < edges_.size(); ++k)
+        rates.set(static_cast<Index>(k), 0, rate(edges_[k], state_.data(), p));
+    return rates;
+}
+
+// W = k L (theta - theta_r) c. Its rate along a motion of q depends on the stiffness, which is counted at fixed strain rates.
+void CreaseTerm::add_stress_work_vjp(const double* q, const Strains& curvatures, Residual& by_q, Gradient&,
+                                     VectorXd*) {
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+        const SimdDouble moment(edges_[k].stiffness * curvatures.number(static_cast<Index>(k), 0));
+        SimdVec3 g[4];
+        fold_at(edges_[k].nodes, q).gradient(g);
+        for (int node = 0; node < 4; ++node) scatter_node(by_q, edges_[k].nodes[node], moment * g[node], 0);
     }
 }
 
@@ -151,11 +173,10 @@ void CreaseTerm::add_rest_vjp(const double* q, const LoadParameters&, const doub
         const Edge& edge = edges_[k];
         const double rate = this->rate(edge, q, lambda);
         const Vec3 along = (nodes_.rest[edge.nodes[1]] - nodes_.rest[edge.nodes[0]]) / edge.length;
-        const double by_length =
-            edge.stiffness / edge.length * (unwrapped_angles_[k] - edge.rest_angle) * rate;
+        const double by_length = edge.stiffness / edge.length * turned(k) * rate;
         out.segment<3>(3 * edge.nodes[1]) += by_length * along;
         out.segment<3>(3 * edge.nodes[0]) -= by_length * along;
-        if (edge.angle_of.rows > 0) continue;
+        if (edge.angle_of.rows > 0 || frozen_) continue;
         SimdVec3 g[4];
         fold_at(edge.nodes, rest.data()).gradient(g);
         for (int node = 0; node < 4; ++node)

@@ -6,17 +6,19 @@
 // strain/dihedral_angle.h with its full turns, and its value theta_r without moment.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "magshell/assembly/lanes.h"
 #include "magshell/body/nodes.h"
 #include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/shell/crease_input.h"
+#include "magshell/terms/stress_rate_term.h"
 #include "magshell/terms/term.h"
 
 namespace magshell {
 
-class CreaseTerm final : public Term, public RestShapeTerm {
+class CreaseTerm final : public Term, public RestShapeTerm, public StressRateTerm {
   public:
     CreaseTerm(const std::vector<CreaseInput>& inputs, const Nodes& nodes, const SystemMatrix& matrix,
                Registry& registry);
@@ -34,12 +36,20 @@ class CreaseTerm final : public Term, public RestShapeTerm {
     void vjp(const double* q, const LoadParameters& load_parameters, const double* lambda,
              Gradient& out) override;
     void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
+    void freeze_stress_rates(const double* p) override;
+    void release_stresses() override { frozen_.reset(); }
+    bool has_stress_work_vjp() const override { return true; }
+    Strains strain_rates(const double* p) override;
+    void add_stress_work_vjp(const double* q, const Strains& curvatures, Residual& by_q, Gradient& out,
+                             VectorXd* by_rest) override;
     std::vector<double> angle_branches() const override { return unwrapped_angles_; }
     void set_angle_branches(const std::vector<double>& angle_branches) override {
         unwrapped_angles_ = angle_branches;
     }
     bool add_projective_stiffness(NodeMatrix&) const override { return false; }
-    std::size_t bytes() const override { return bytes_of(edges_) + bytes_of(unwrapped_angles_); }
+    std::size_t bytes() const override {
+        return bytes_of(edges_) + bytes_of(unwrapped_angles_) + bytes_of(state_);
+    }
 
   private:
     struct Edge {
@@ -55,12 +65,18 @@ class CreaseTerm final : public Term, public RestShapeTerm {
     };
     /// Returns the rate of the angle of an edge at q along lambda.
     static double rate(const Edge& edge, const double* q, const double* lambda);
+    /// Returns theta - theta_r at the last evaluated state, or the rate of theta that is held.
+    double turned(std::size_t k) const {
+        return frozen_ ? frozen_->number(static_cast<Index>(k), 0) : unwrapped_angles_[k] - edges_[k].rest_angle;
+    }
     /// Returns theta at q with as many full turns as make it nearest to its value at the last evaluated state.
     double unwrapped_angle(const double* q, std::size_t k) const;
 
     const Nodes& nodes_;
     std::vector<Edge> edges_;
     std::vector<double> unwrapped_angles_;  // of each edge at the last evaluated state
+    std::vector<double> state_;             // positions there
+    std::optional<Strains> frozen_;           // rates of theta while moments are held at their rates
     bool psd_projection_ = false;
 };
 

@@ -5,7 +5,9 @@
 // method, which extrapolates their stresses.
 #pragma once
 
+#include "magshell/terms/rest_shape_term.h"
 #include "magshell/terms/shell/strains.h"
+#include "magshell/terms/stress_rate_term.h"
 #include "magshell/terms/term.h"
 
 namespace magshell {
@@ -56,7 +58,7 @@ class ElasticTerm : public Term {
 ///       strain(group, q, d), rate(group, p, d)   the strains d at q; J p at the last evaluated state
 ///       stiffness(group)                        C
 template <class Kernel, int N = 3>
-class StrainScaffold : public ElasticTerm {
+class StrainScaffold : public ElasticTerm, public StressRateTerm {
   public:
     explicit StrainScaffold(Index elements) : stress_(elements, N), extrapolated_(elements, N) {}
 
@@ -94,6 +96,25 @@ class StrainScaffold : public ElasticTerm {
         return out;
     }
 
+    /// Holds the rates as a strain history: C (0 d + J p) is their stress.
+    void freeze_stress_rates(const double* p) final {
+        frozen_ = Strains(stress_.elements, N);
+        if (p) {
+            frozen_ = strain_rates(p);
+            for (SimdDouble& entry : frozen_.groups) entry = -entry;
+        }
+        history_ = {0.0, &frozen_};
+    }
+    void release_stresses() final { history_ = {}; }
+    bool has_stress_work_vjp() const final { return true; }
+    void add_stress_work_vjp(const double*, const Strains& curvatures, Residual& by_q, Gradient& out,
+                             VectorXd* by_rest) final {
+        const Strains weights = stresses(curvatures);
+        add_forces(weights, by_q);
+        strains_vjp(weights, out);
+        if (by_rest) static_cast<const RestShapeTerm&>(kernel()).add_rest_strains_vjp(weights, *by_rest);
+    }
+
   protected:
     /// Computes and stores the stress of a SIMD vector from its strain.
     void store_stress(Index group, SimdDouble strain[N]) {
@@ -108,6 +129,8 @@ class StrainScaffold : public ElasticTerm {
     Strains stress_, extrapolated_;
 
   private:
+    Strains frozen_;  // -J p, while stresses are held at their rates
+
     Kernel& kernel() { return static_cast<Kernel&>(*this); }
     const Kernel& kernel() const { return static_cast<const Kernel&>(*this); }
 };

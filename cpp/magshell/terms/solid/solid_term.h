@@ -19,7 +19,7 @@ struct PointStates {
     std::vector<double> volumes;              // reference volumes [m3]
 };
 
-class SolidTerm : public ElasticTerm {
+class SolidTerm : public ElasticTerm, public StressRateTerm {
   public:
     std::string_view name() const final { return "solid"; }
     /// Returns deformation gradients and elastic stresses at q, without viscous stresses.

@@ -52,26 +52,33 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest(VectorXd& out,
         for (int k = 0; k < N; ++k) out.segment<3>(3 * this->element_nodes_[t][k]) += by_nodes[t][k];
 }
 
-template <class Element, class Material, class Moduli, bool mean>
-void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest_vjp(const double* q, const LoadParameters&,
-                                                                   const double* lambda, VectorXd& out) {
+/// Returns vectors for which the blocks of a tangent of four nodes are the derivatives dP/dF.
+inline std::array<SimdVec3, 4> unit_gradients() {
     const SimdDouble zero(0.0), one(1.0);
     const SimdVec3 x{one, zero, zero}, y{zero, one, zero}, z{zero, zero, one};
-    const SimdVec3 axes[4] = {-(x + y + z), x, y, z};
+    return {-(x + y + z), x, y, z};
+}
+
+template <class Element, class Material, class Moduli, bool mean>
+template <class Rates>
+void TetrahedraTerm<Element, Material, Moduli, mean>::add_work_rest_vjp(const double* q, const Rates& rates,
+                                                                        VectorXd& out) const {
+    const std::array<SimdVec3, 4> axes = unit_gradients();
     add_rest(out, [&](Index group, SimdMat3 by_deformation[points]) {
         const State state(*this, group, q);
         const SimdDouble* c = constants_[group].at;
-        SimdVec3 adjoint[N];
-        loop_.gather(group, lambda, adjoint);
+        SimdMat3 all_along[points];
+        rates(group, state, all_along);
         SimdDouble volume_rate(0.0);
         for (int p = 0; p < points; ++p) {
             const SimdDouble volume = rest_[group].volume[p];
-            const SimdMat3 &f = state.f[p], along = gradient_of(group, p, adjoint);
+            const SimdMat3 &f = state.f[p], &along = all_along[p];
             SimdDouble s[stresses_];
             state.at[p].stress(c, state.of(p).pressure, s);
             const SimdMat3 piola = state.at[p].piola(c, s);
             const SimdDouble bulk = mean ? SimdDouble(0.0) : state.of(p).bulk;
-            const typename Material::template Tangent<4> tangent(state.at[p], c, s, bulk, volume, axes);
+            const typename Material::template Tangent<4> tangent(state.at[p], c, s, bulk, volume,
+                                                                 axes.data());
             SimdMat3& by = by_deformation[p];
             by =
                 -transposed_times(f, tangent_along(tangent, along)) - volume * transposed_times(along, piola);
@@ -89,6 +96,62 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest_vjp(const double*
             }
         }
     });
+}
+
+template <class Element, class Material, class Moduli, bool mean>
+template <class Rates>
+Strains TetrahedraTerm<Element, Material, Moduli, mean>::stress_rates(const double* q,
+                                                                      const Rates& rates) const {
+    const std::array<SimdVec3, 4> axes = unit_gradients();
+    Strains out(this->elements(), 6 * points);
+    loop_.each_group([&](Index group) {
+        const State state(*this, group, q);
+        const SimdDouble* c = constants_[group].at;
+        SimdMat3 along[points], by[points], piola[points];
+        rates(group, state, along);
+        SimdDouble volume_rate(0.0);
+        for (int p = 0; p < points; ++p) {
+            const SimdDouble volume = rest_[group].volume[p];
+            SimdDouble s[stresses_];
+            state.at[p].stress(c, state.of(p).pressure, s);
+            piola[p] = volume * state.at[p].piola(c, s);
+            const SimdDouble bulk = mean ? SimdDouble(0.0) : state.of(p).bulk;
+            by[p] = tangent_along(
+                typename Material::template Tangent<4>(state.at[p], c, s, bulk, volume, axes.data()),
+                along[p]);
+            volume_rate += volume * state.at[p].volume_rate(along[p]);
+        }
+        for (int p = 0; p < points; ++p) {
+            if constexpr (mean)
+                by[p] += state.volumetric[0].bulk * volume_rate / rest_[group].total() *
+                         rest_[group].volume[p] * state.at[p].volume_piola();
+            const SimdMat3 cofactors = cofactor(state.f[p]);
+            const SimdDouble inverse = SimdDouble(1.0) / determinant(state.f[p], cofactors);
+            const SimdMat3 second = inverse * transposed_times(cofactors, piola[p]);
+            const SimdMat3 rate = inverse * transposed_times(cofactors, by[p] - multiply(along[p], second));
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j <= i; ++j)
+                    out.at(group)[6 * p + Green::at[i][j]] =
+                        SimdDouble(0.5) * (rate.at[3 * i + j] + rate.at[3 * j + i]);
+        }
+    });
+    return out;
+}
+
+template <class Element, class Material, class Moduli, bool mean>
+void TetrahedraTerm<Element, Material, Moduli, mean>::freeze_stress_rates(const double* p) {
+    frozen_ = p ? stress_rates(state_.data(), along_motion(p)) : Strains(this->elements(), 6 * points);
+}
+
+template <class Element, class Material, class Moduli, bool mean>
+void TetrahedraTerm<Element, Material, Moduli, mean>::add_stress_work_vjp(const double* q,
+                                                                          const Strains& curvatures,
+                                                                          Residual& by_q, Gradient& out,
+                                                                          VectorXd* by_rest) {
+    const auto rates = along_strains(curvatures);
+    add_forces(stress_rates(q, rates), by_q);
+    add_work_vjp(q, rates, out);
+    if (by_rest) add_work_rest_vjp(q, rates, *by_rest);
 }
 
 // The viscous power is V S : sym(F^T L) with the stresses S of d = (scale - 1) E - shift. The shift is that of earlier states

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "magshell/assembly/element_blocks.h"
 #include "magshell/terms/rest_shape_term.h"
@@ -72,6 +73,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
 
     void evaluate(const double* q, const LoadParameters&, Residual& out) override {
         state_.assign(q, q + 3 * n_nodes_);
+        if (frozen_) return add_forces(*frozen_, out);
         if (this->history_.shift) viscous_.resize(this->elements(), points);
         // All calls are inlined: passing SIMD vectors between functions through memory takes a third of the time.
         loop_.scatter_groups([&](Index group) __attribute__((flatten)) {
@@ -95,6 +97,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
 
     void assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
                   bool extrapolated_stress, SystemMatrix& out) const override {
+        if (frozen_) return assemble_frozen(element_block, out);
         const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
         const Strains& viscous = extrapolated_stress ? viscous_.extrapolated : viscous_.own;
         ElementLoop<N>::over_groups(element_block, [&](Index group) __attribute__((flatten)) {
@@ -172,45 +175,20 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
     }
 
     void vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) override {
-        struct Constants {
-            double by[n_constants];
-        };
-        std::vector<Constants> of_elements(this->elements());
-        loop_.each_group([&](Index group) {
-            const State state(*this, group, q);
-            const SimdDouble* c = constants_[group].at;
-            SimdVec3 adjoint[N];
-            loop_.gather(group, lambda, adjoint);
-            SimdDouble by[n_constants], share[n_constants], rate(0.0);
-            for (SimdDouble& entry : by) entry = SimdDouble(0.0);
-            const auto add = [&](const SimdDouble& factor) {
-                for (int k = 0; k < n_constants; ++k) by[k] += factor * share[k];
-            };
-            for (int p = 0; p < points; ++p) {
-                const SimdDouble volume = rest_[group].volume[p];
-                const SimdMat3 along = gradient_of(group, p, adjoint);
-                state.at[p].work_by_constants(c, along, share);
-                add(volume);
-                rate += volume * state.at[p].volume_rate(along);
-                if constexpr (!mean) {
-                    Material::pressure_by_constants(c, state.at[p].volume_measure(), share);
-                    add(rate);
-                    rate = SimdDouble(0.0);
-                }
-                if (this->history_.shift) add_viscous_vjp(group, p, state.f[p], along, by);
-            }
-            if constexpr (mean) {
-                Material::pressure_by_constants(c, state.mean_measure, share);
-                add(rate);
-            }
-            for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
-                for (int k = 0; k < n_constants; ++k)
-                    of_elements[loop_.element(group, lane)].by[k] = by[k][lane];
-        });
-        for (Index t = 0; t < this->elements(); ++t) this->moduli_.add_vjp(t, of_elements[t].by, out);
+        if (!frozen_) add_work_vjp(q, along_motion(lambda), out);
     }
 
-    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
+    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override {
+        if (!frozen_) add_work_rest_vjp(q, along_motion(lambda), out);
+    }
+
+    // With Green's strain E, d2E is the same at all states. So the Hessian of held stresses V S' has no derivative, and that of
+    // W = sum_p V S : c is one of the power P : L for the rates L = F^-T c, whose strain rate is c.
+    void freeze_stress_rates(const double* p) override;
+    void release_stresses() override { frozen_.reset(); }
+    bool has_stress_work_vjp() const override { return true; }
+    void add_stress_work_vjp(const double* q, const Strains& curvatures, Residual& by_q, Gradient& out,
+                             VectorXd* by_rest) override;
 
     void add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const override {
         add_rest(out, [&](Index group, SimdMat3 by_deformation[points]) {
@@ -274,7 +252,8 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
 
     std::size_t bytes() const override {
         return this->bytes_of_elements() + bytes_of(stress_.groups) + bytes_of(extrapolated_.groups) +
-               bytes_of(state_) + bytes_of(viscous_.own.groups) + bytes_of(viscous_.extrapolated.groups);
+               bytes_of(state_) + (frozen_ ? bytes_of(frozen_->groups) : 0) + bytes_of(viscous_.own.groups) +
+               bytes_of(viscous_.extrapolated.groups);
     }
 
   private:
@@ -287,6 +266,91 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
             extrapolated = own;
         }
     };
+
+    // Adds the derivatives by parameters of the power sum_p V_p P_p : L_p. rates(group, state, L) computes the L of a SIMD vector of elements.
+    template <class Rates>
+    void add_work_vjp(const double* q, const Rates& rates, Gradient& out) const {
+        struct Constants {
+            double by[n_constants];
+        };
+        std::vector<Constants> of_elements(this->elements());
+        loop_.each_group([&](Index group) {
+            const State state(*this, group, q);
+            const SimdDouble* c = constants_[group].at;
+            SimdMat3 all_along[points];
+            rates(group, state, all_along);
+            SimdDouble by[n_constants], share[n_constants], rate(0.0);
+            for (SimdDouble& entry : by) entry = SimdDouble(0.0);
+            const auto add = [&](const SimdDouble& factor) {
+                for (int k = 0; k < n_constants; ++k) by[k] += factor * share[k];
+            };
+            for (int p = 0; p < points; ++p) {
+                const SimdDouble volume = rest_[group].volume[p];
+                const SimdMat3& along = all_along[p];
+                state.at[p].work_by_constants(c, along, share);
+                add(volume);
+                rate += volume * state.at[p].volume_rate(along);
+                if constexpr (!mean) {
+                    Material::pressure_by_constants(c, state.at[p].volume_measure(), share);
+                    add(rate);
+                    rate = SimdDouble(0.0);
+                }
+                if (this->history_.shift) add_viscous_vjp(group, p, state.f[p], along, by);
+            }
+            if constexpr (mean) {
+                Material::pressure_by_constants(c, state.mean_measure, share);
+                add(rate);
+            }
+            for (int lane = 0; lane < loop_.lanes_in(group); ++lane)
+                for (int k = 0; k < n_constants; ++k)
+                    of_elements[loop_.element(group, lane)].by[k] = by[k][lane];
+        });
+        for (Index t = 0; t < this->elements(); ++t) this->moduli_.add_vjp(t, of_elements[t].by, out);
+    }
+
+    // Adds the derivatives of the same power by rest positions.
+    template <class Rates>
+    void add_work_rest_vjp(const double* q, const Rates& rates, VectorXd& out) const;
+    // Returns the function for rates along a motion of the nodes.
+    auto along_motion(const double* motion) const {
+        return [this, motion](Index group, const State&, SimdMat3 out[points]) {
+            SimdVec3 of_nodes[N];
+            loop_.gather(group, motion, of_nodes);
+            for (int p = 0; p < points; ++p) out[p] = gradient_of(group, p, of_nodes);
+        };
+    }
+    // Returns the function for rates L = F^-T c of strains c.
+    auto along_strains(const Strains& strains) const {
+        return [&strains](Index group, const State& state, SimdMat3 out[points]) {
+            for (int p = 0; p < points; ++p) {
+                SimdDouble of_point[6];
+                for (int i = 0; i < 6; ++i)
+                    of_point[i] = SimdDouble(i < 3 ? 1.0 : 0.5) * strains.at(group)[6 * p + i];
+                const SimdMat3 cofactors = cofactor(state.f[p]);
+                out[p] = SimdDouble(1.0) / determinant(state.f[p], cofactors) *
+                         multiply(cofactors, Green::matrix(of_point));
+            }
+        };
+    }
+    // Returns the rates V S' of the second Piola-Kirchhoff stresses times volumes, S = F^-1 P.
+    template <class Rates>
+    Strains stress_rates(const double* q, const Rates& rates) const;
+    void assemble_frozen(const ElementBlock& element_block, SystemMatrix& out) const {
+        ElementLoop<N>::over_groups(element_block, [&](Index group) {
+            const SimdDouble zero(0.0);
+            SimdVec3 x[N], g[N];
+            SimdMat3 h[N * (N + 1) / 2];
+            loop_.gather(group, state_.data(), x);
+            for (int p = 0; p < points; ++p) {
+                Element::gradients(rest_[group].gradients[p], p, g);
+                add_blocks<N>(QuadraticTangent<N>(gradient_of(group, p, x), frozen_->at(group) + 6 * p, zero,
+                                                  zero, SimdDouble(1.0), g),
+                              p == 0, h);
+            }
+            complete_blocks<N>(h);
+            loop_.scatter(group, h, out);
+        });
+    }
 
     // Returns B of the viscous part of lambda . g at a point (tetrahedra_rest.h).
     SimdMat3 viscous_by_rest(Index group, int p, const SimdMat3& f, const SimdMat3& along) const;
@@ -332,7 +396,8 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
     const Index n_nodes_;
     Strains stress_, extrapolated_;
     ViscousStresses viscous_;
-    std::vector<double> state_;  // positions of the last evaluated state
+    std::optional<Strains> frozen_;  // V S' while stresses are held at their rates
+    std::vector<double> state_;    // positions of the last evaluated state
 };
 
 }  // namespace magshell

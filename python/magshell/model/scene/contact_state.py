@@ -198,12 +198,13 @@ class ContactState:
         the first.
     normal_forces: (k,) N, repulsive; negative for correction pairs.
     friction_forces: (k, 3) N, on the first part; the second has the opposite. sliding_velocities: (k, 3) m/s, of the
-        first part along the second. Both are zero at rest. With lagged friction these are the forces for the normal
+        first part relative to a body that moves and turns as the face of the second does. Both are zero at rest, and
+        between bodies where these turn together. With lagged friction these are the forces for the normal
         forces of this state, not for those of the beginning of the step.
     coefficient: the largest ratio of friction to normal force; zero without friction. sticking_speed: m/s.
     forces: (n_v, 3) N, the contact forces on every vertex of the scene. They include the moments on nearly parallel
         edges, where the energy of a pair fades out; these have no resultant on an edge. friction: (n_v, 3) N, the
-        friction forces.
+        friction forces, without a moment between bodies.
     normal_force_magnitudes: (n_v,) N, the normal forces that act on each vertex, added without regard to direction.
     shape_pairs: (k, 2), of a Contact with shapes: the numbers of each pair in `contact.shapes` and `contact.obstacles`;
         empty for all other contacts.
@@ -307,13 +308,15 @@ def compute_contact_state(
 def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: float) -> ContactState:
     """Build the state from the arrays of `_core.touching_pairs`, and sum the forces of the pairs on each vertex."""
     pairs, weights = found["pairs"], found["weights"]
-    there = pairs >= 0  # False for the padding of pairs of three or two vertices
 
-    def on_vertices(rows: np.ndarray) -> np.ndarray:
-        """Sum rows of the pairs' vertices, (k, 4) or (k, 4, 3), to the vertices of the scene."""
+    def on_vertices(rows: np.ndarray, vertices: np.ndarray = pairs) -> np.ndarray:
+        """Sum rows of the pairs' vertices, (k, m) or (k, m, 3), to the vertices of the scene."""
+        there = vertices >= 0  # False for the padding of pairs of fewer vertices
         sums = np.zeros((scene._bodies.n_rows, *rows.shape[2:]))
-        np.add.at(sums, pairs[there], rows[there])
+        np.add.at(sums, vertices[there], rows[there])
         return sums[: scene.mesh.n_vertices]
+
+    friction = found.get("vertex_friction_forces", weights[:, :, None] * found["friction_forces"][:, None, :])
 
     return ContactState(
         pairs,
@@ -325,7 +328,7 @@ def _gathered(scene, found: dict[Any, Any], coefficient: float, sticking_speed: 
         float(coefficient),
         float(sticking_speed),
         on_vertices(found["forces"]),
-        on_vertices(weights[:, :, None] * found["friction_forces"][:, None, :]),
+        on_vertices(friction, found.get("slip_vertices", pairs)),
         on_vertices(np.abs(weights) * found["normal_forces"][:, None]),
         found.get("shape_pairs", np.zeros((0, 2), dtype=np.int64)),
         on_vertices((weights * found["normal_forces"][:, None])[:, :, None] * found["normals"][:, None, :]),

@@ -1,10 +1,11 @@
 """Gradients of buckling factors of linear theory. Works on arrays; autograd.py has the tensors.
 
-    (K + f J) v = 0,   v . J v = -1:      df = v . (dK + f dJ) v
-    J = d/dt K(q + t u, c + t (c1 - c)),   K u = g(q, c) - g(q, c1)
+    (K + f G) v = 0,   v . G v = -1:      df = v . (dK + f dG) v
+    G = K_s(u) + K_l,   K u = g(q, c) - g(q, c1)
 
-with the state q and the load parameters c of K, and the load parameters c1 towards which these go. u depends on the inputs,
-and about an equilibrium q does. Each costs one solve with K for all inputs, whose factorization the factors have left.
+with the state q and the load parameters c of K, and the load parameters c1 towards which these go. G is the stiffness of the
+rates of stresses along the response u, and of loads (stress_stiffness.py). u depends on the inputs, and about an equilibrium
+q does. Each costs one solve with K for all inputs, whose factorization the factors have left.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from ...errors import NoGradient
 from .eigenvalue import EigenvalueAdjoint
 from .residual import Residual
+from .stress_stiffness import StressStiffnessDerivatives
 
 if TYPE_CHECKING:
     from ...model.scene.solve_inputs import Leaf
@@ -64,18 +66,18 @@ class BucklingAdjoint(EigenvalueAdjoint):
         here, factor, response = self._residual, self._eigenvalues[k], self._response
         vector = self._vectors[:, k]
         vector = vector * np.sqrt(factor / (vector @ here.product(vector)))
-        by_stiffness = here.hessian_derivatives(vector, vector)
-        rates = here.hessian_derivative_rates(vector, response, self._after - here.load_parameters)
-        # d/dt [(1 - t) K_c] for the load parameters before, d/dt [t K_c] for those after.
-        by_after = factor * by_stiffness.by_load_parameters
-        total = by_stiffness.plus(factor, rates)
-        total = total._replace(by_load_parameters=total.by_load_parameters - by_after)
-        multiplier = self._multiplier(factor * by_stiffness.by_state)
+        stresses = StressStiffnessDerivatives(here, self._after, response, vector)
+        of_stresses, by_after = stresses.derivatives()
+        total, by_after = (
+            here.hessian_derivatives(vector, vector).plus(factor, of_stresses),
+            factor * by_after,
+        )
+        multiplier = self._multiplier(factor * stresses.by_motion())
         there = here.at(here.state, self._after).derivatives(multiplier)
         total = total.plus(1.0, here.hessian_derivatives(multiplier, response)).plus(
             -1.0, here.derivatives(multiplier)
         )
-        total = total.plus(1.0, there._replace(by_load_parameters=np.zeros_like(there.by_load_parameters)))
+        total = total.plus(1.0, there.at_fixed_load_parameters())
         by_after = by_after + there.by_load_parameters
         if self._at_rest:
             total = total.at_fixed_state()

@@ -1,4 +1,4 @@
-"""Central differences of high order along one direction or two."""
+"""Central differences of high order along one direction."""
 
 from __future__ import annotations
 
@@ -32,19 +32,6 @@ def directional_derivative(
     return _extrapolated([_Stencil(function, step, rounding, sizes) for step in steps])
 
 
-def mixed_derivative(
-    function: Callable[[float, float], np.ndarray],
-    steps: list[float],
-    rounding: float = ROUNDING,
-    sizes: np.ndarray | None = None,
-) -> np.ndarray | None:
-    """Return the second derivative of a function of two numbers by both at zero, otherwise like `directional_derivative`.
-
-    It takes sixteen values of the function, on both diagonals, where a difference of differences would take 64.
-    """
-    return _extrapolated([_MixedStencil(function, step, rounding, sizes) for step in steps])
-
-
 def _extrapolated(stencils: list[_Stencil]) -> np.ndarray | None:
     best, smallest, before = None, _LARGEST_DIFFERENCE, np.inf
     for stencil in stencils:
@@ -74,11 +61,9 @@ def _extrapolated(stencils: list[_Stencil]) -> np.ndarray | None:
 class _Stencil:
     """Central differences of a function at multiples of a step."""
 
-    _order = 1  # of the derivative
-
     def __init__(
         self,
-        function: Callable[..., np.ndarray],
+        function: Callable[[float], np.ndarray],
         step: float,
         rounding: float,
         sizes: np.ndarray | None,
@@ -96,9 +81,9 @@ class _Stencil:
     def _slope(self, step: float) -> np.ndarray:
         return (self._value(step) - self._value(-step)) / (2 * step)
 
-    def _value(self, *at: float) -> np.ndarray:
+    def _value(self, at: float) -> np.ndarray:
         """Return the function, and take note of its size."""
-        value = self._function(*at)
+        value = self._function(at)
         self._largest = np.maximum(self._largest, np.abs(value).max(axis=-1, initial=0.0))
         return value
 
@@ -114,7 +99,7 @@ class _Stencil:
         if not (np.isfinite(one).all() and np.isfinite(other).all()):
             return np.inf
         size, apart = (np.abs(each).max(axis=-1, initial=0.0) for each in (one, one - other))
-        apart = apart - self._rounding * self._largest_of_all() / self._step**self._order
+        apart = apart - self._rounding * self._largest_of_all() / self._step
         return float(np.max(apart / np.where(size > 0.0, size, 1.0), where=apart > 0.0, initial=0.0))
 
     def _largest_of_all(self) -> np.ndarray | float:
@@ -124,13 +109,3 @@ class _Stencil:
         largest = float((self._largest * self._sizes).max(initial=0.0))
         sizes = np.where(self._sizes > 0.0, self._sizes, np.inf)
         return np.maximum(self._largest, largest / sizes)
-
-
-class _MixedStencil(_Stencil):
-    """Second differences of a function of two numbers along its diagonals, with errors like those of central ones."""
-
-    _order = 2
-
-    def _slope(self, step: float) -> np.ndarray:
-        along = self._value(step, step) + self._value(-step, -step)
-        return (along - self._value(step, -step) - self._value(-step, step)) / (4 * step**2)

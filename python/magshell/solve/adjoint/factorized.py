@@ -103,6 +103,20 @@ def times_low_rank(low_rank: tuple[np.ndarray, ...], vector: np.ndarray) -> np.n
     return columns @ (stiffnesses * (columns.T @ vector))
 
 
+def sum_of_low_rank(
+    one: tuple[np.ndarray, ...], other: tuple[np.ndarray, ...], factor: float
+) -> tuple[np.ndarray, ...]:
+    """Return the columns and stiffnesses of a matrix of low rank plus a multiple of another one; () if it is zero."""
+    if not other:
+        return one
+    if not one:
+        return other[0], factor * other[1]
+    if np.array_equal(one[0], other[0]):
+        stiffnesses = one[1] + factor * other[1]
+        return (one[0], stiffnesses) if np.any(stiffnesses) else ()
+    return np.hstack([one[0], other[0]]), np.concatenate([one[1], factor * other[1]])
+
+
 def times_operators(
     operators: tuple[tuple[float, _core.OperatorPart], ...], vector: np.ndarray
 ) -> np.ndarray:

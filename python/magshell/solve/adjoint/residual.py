@@ -18,7 +18,7 @@ from ... import _core
 from ...errors import NoGradient
 from ...model.scene.reshaped import REST
 from ...model.scene.values import Gradient
-from .differences import ROUNDING, directional_derivative, mixed_derivative
+from .differences import ROUNDING, directional_derivative
 from .factorized import StiffnessParts, stiffness_parts
 
 if TYPE_CHECKING:
@@ -56,6 +56,10 @@ class Derivatives(NamedTuple):
         """Return the same for a state that is the rest shape: its nodes are those at rest, and its other unknowns zero."""
         nodes = self.by_state[: self.by_rest.size]
         return self.at_fixed_state()._replace(by_rest=self.by_rest + nodes)
+
+    def at_fixed_load_parameters(self) -> Derivatives:
+        """Return the same without the derivatives by load parameters."""
+        return self._replace(by_load_parameters=np.zeros_like(self.by_load_parameters))
 
     def at_fixed_state(self) -> Derivatives:
         """Return the same without the derivatives by unknowns."""
@@ -133,27 +137,17 @@ class Residual:
 
         return self._rates(at, self._relative_size(along))
 
-    def hessian_derivative_rates(
-        self, motion: np.ndarray, along: np.ndarray, rate: np.ndarray
-    ) -> Derivatives:
-        """Return the rates of `hessian_derivatives(motion, motion)` as the state moves along a motion and load parameters
-        at a rate.
+    def rates(self, function: Callable[[float], Derivatives], motion: np.ndarray) -> Derivatives:
+        """Return the derivative of a function at 0, of the multiple of a motion by which the state moves.
 
-        Raises NoGradient where the forces are not smooth.
+        Raises NoGradient where it is not smooth.
         """
+        return self._rates(function, self._relative_size(motion))
 
-        lengths = self._relative_size(motion), self._relative_size(along) or 1.0
-        if lengths[0] == 0.0:
-            return self._split(np.zeros(sum(self._counts)))
-        moved, turned, loaded = motion / lengths[0], along / lengths[1], rate / lengths[1]
-
-        def at(first: float, second: float) -> np.ndarray:
-            load_parameters = self.load_parameters + second * loaded
-            there = self.at(self.state + first * moved + second * turned, load_parameters)
-            return self._rows(there.derivatives(motion))
-
-        rates = mixed_derivative(at, self._steps, ROUNDING, self._sizes(self._parts))
-        return self._from_rows(rates).times(lengths[0] * lengths[1])
+    def steps(self, motion: np.ndarray) -> list[float]:
+        """Return the multiples of a motion that differences along it try as steps."""
+        length = self._relative_size(motion) or 1.0
+        return [step / length for step in self._steps]
 
     def _rates(self, function: Callable[[float], Derivatives], length: float) -> Derivatives:
         """Return the derivative of a function of one number at 0, in steps of a fraction over this length."""

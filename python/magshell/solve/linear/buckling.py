@@ -1,8 +1,9 @@
-"""Buckling loads from the Hessian: ms.linear_buckling."""
+"""Buckling loads of linear theory: ms.linear_buckling."""
 
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -15,16 +16,19 @@ from ..._input.tensors import detached, dtype_like, like
 from ..._runtime.frozen import immutable
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import solve_entry
-from ...errors import NotConverged
+from ..._runtime.warning_stacklevel import callers_level
+from ...errors import LinearTheoryWarning, NotConverged
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs
 from ..adjoint.buckling import BucklingAdjoint
-from ..adjoint.factorized import StiffnessParts, stiffness_parts
+from ..adjoint.factorized import StiffnessParts
+from ..adjoint.stress_stiffness import stress_stiffness
 from ..statics.equilibrium import Equilibrium
 from .base_state import StiffnessAbout, leaves_of, linear_inputs, residual_of
 from .mode_shapes import mode_shapes
 from .operator_pencils import OperatorBucklingPencil
 from .rest import RestStiffness, pulling_parts, refuse_springs
+from .small_displacement import smallness
 from .stiffness import Stiffness
 
 if TYPE_CHECKING:
@@ -32,9 +36,7 @@ if TYPE_CHECKING:
 
 
 _LARGEST_CHANGE = 1e100  # over the stiffness itself: its square still is a number
-_ROUND_OFF = 1e-14  # of a length: what moves no more does not move
-_PRE_LOAD = 1e-4  # displacement at which the change of the Hessian is measured, over the mean edge length
-_LARGEST_DISPLACEMENT = 0.1  # before buckling, over the sheet's size: beyond, linear theory says nothing
+_LARGEST_DISPLACEMENT = 1.0  # before buckling, over the size of the bodies: linear theory says nothing beyond
 
 
 @immutable
@@ -82,19 +84,23 @@ def linear_buckling(
 ) -> Buckling:
     """Compute the smallest positive multiples of the load parameters at which a scene buckles, by linear theory.
 
-    With K(q, c) the Hessian, c the load parameters and u the linear response to them,
+    With K the Hessian, c the load parameters, and u the linear response to them,
 
-        (K + lambda dK) v = 0,     dK = d/dt K(rest + t u, t c) at t = 0, by a central difference     [Pa m]
+        (K + lambda (K_s + K_l)) v = 0,     K_s = sum_i s'_i d2d_i/dq2,   s' = C J u     [Pa m]
 
-    so the state before buckling is assumed proportional to lambda, and K to change linearly with it. This is exact in the
-    limit of small displacements before buckling: columns, plates loaded in their plane, closed shells. A shallow arch, which
-    softens before it buckles, needs ms.follow_path. The stiffness of a field is included.
+    K_s is the stiffness of the stresses s that grow with u (initial stress or geometric stiffness, as in *BUCKLE of Abaqus
+    and CalculiX), for strains d with the Jacobian J and the moduli C; K_l is the stiffness of the loads and fields. So the
+    stresses before buckling are taken to be proportional to lambda, and the shape to be that without them. This is exact in
+    the limit of small displacements before buckling: columns, plates loaded in their plane, closed shells. Where the
+    displacements at the first factor are not small, ms.LinearTheoryWarning says so. A shallow arch, a bent plate or an open
+    section that bends and twists softens before it buckles, and needs ms.follow_path. The stiffness of a CustomEnergy and
+    of contacts with obstacles stays what it is.
 
     With own_field the magnetic field of the bodies themselves is a load like others: at rest the factors multiply it with
     them, and about an equilibrium it is a part of K.
 
-    Forces on a susceptible shell are quadratic in the field: in a scene with one the factors multiply the field, u and dK
-    are by the square of the factor, and nothing but the field on such shells may load the scene.
+    Forces on a susceptible shell are quadratic in the field: in a scene with one the factors multiply the field, u, K_s and
+    K_l go with the square of the factor, and nothing but the field on such shells may load the scene.
 
     {keywords}
     values: as in ms.equilibrium.
@@ -105,8 +111,8 @@ def linear_buckling(
         fractions of this change: the parameter of ms.follow_path(..., start=). Magnetization and values are those of the
         equilibrium.
 
-    modes: the number of modes to find. Modes for which linear theory does not hold are left out: where the sheet has moved
-        by a tenth of its size, or at a thousand times the first factor of either sign.
+    modes: the number of modes to find. Modes for which linear theory does not hold are left out: where the bodies have moved
+        by their size, or at a thousand times the first factor of either sign.
 
     Refused are joints that pull at rest or have motors, since no load parameter multiplies them; actuators that are springs;
     and bodies in contact, since a contact bears in one direction only, so that a mode and its opposite have different
@@ -116,7 +122,8 @@ def linear_buckling(
     parameters that are tensors, and by the inputs of an equilibrium that was found with tensors, with the change of the
     equilibrium. A gradient costs some dozens of evaluations of the stiffness for each factor asked for; with own_field these
     take most of the time. Factors that equal the next one to 1e-6 have none, nor those of loads
-    with which supports move: NoGradient says so.
+    with which supports move, nor those about an equilibrium with muscles, elastic tendons or closed cavities, whose forces
+    change: NoGradient says so.
     Modes are arrays.
 
     Raises ValueError on bad input, about an equilibrium that is not stable or with its own load parameters; in a scene with
@@ -166,7 +173,7 @@ def linear_buckling(
         displacement = float(np.abs(model.points(response)).max())
         if quadratic:
             _refuse_odd_loads(scene, stiffness, inputs)
-        change = _stiffness_change(scene, stiffness, response, displacement, inputs, quadratic)
+        change = _stiffness_change(stiffness, response, inputs)
         if (change.operators or stiffness.parts.operators) and change.fits_dense:
             stiffness, change = stiffness.dense(), change.dense()
     leaves = leaves_of(inputs, equilibrium)
@@ -174,6 +181,7 @@ def linear_buckling(
     factors, vectors = _lowest(stiffness, change, asked, _LARGEST_DISPLACEMENT * _size(scene), displacement)
     if quadratic:
         factors = np.sqrt(factors)
+    _warn_of_displacements(scene, stiffness, response, float(factors[0]), quadratic)
     shapes, edge_rotations = mode_shapes(model, vectors[:, :modes])
     return Buckling(
         scene=scene,
@@ -255,54 +263,40 @@ def _refuse_odd_loads(scene: Scene, stiffness: Stiffness, inputs: Inputs) -> Non
         )
 
 
-def _stiffness_change(
-    scene: Scene,
-    stiffness: Stiffness,
-    response: np.ndarray,
-    displacement: float,
-    inputs: Inputs,
-    quadratic: bool,
-) -> StiffnessParts:
-    """Return the parts of dK, in the pattern of K, for load parameters that go from those of K to those of the inputs.
+def _stiffness_change(stiffness: Stiffness, response: np.ndarray, inputs: Inputs) -> StiffnessParts:
+    """Return K_s + K_l, in the pattern of K, for load parameters that go from those of K to those of the inputs.
 
-    quadratic: forces and stiffness are proportional to the square of the load parameters; dK is by that square.
+    With susceptible shells both are those of the squares of the load parameters.
     """
-    # Where nothing moves before buckling, K is linear in the load parameters and any step is exact.
-    edges = scene.mesh.edge_lengths
-    length = float(edges.mean()) if len(edges) else _size(scene)
-    moves = displacement > _ROUND_OFF * length
-    step = _PRE_LOAD * length / displacement if moves else 1.0
-
-    def parts(t: float, of_load_parameters: float) -> StiffnessParts:
-        load_parameters = (
-            1.0 - of_load_parameters
-        ) * stiffness.load_parameters + of_load_parameters * inputs.load_parameters
-        return stiffness_parts(scene._model, stiffness.state + t * response, load_parameters)
-
-    def values(t: float, of_load_parameters: float) -> np.ndarray:
-        return parts(t, of_load_parameters).triangle[3]
-
-    operators: tuple[Any, ...] = ()
-    if quadratic:
-        change = (values(step, 0.0) - values(-step, 0.0)) / (2.0 * step) + values(0.0, 1.0) - values(0.0, 0.0)
-    else:
-        ahead, behind = parts(step, step), parts(-step, -step)
-        change = (ahead.triangle[3] - behind.triangle[3]) / (2.0 * step)
-        operators = tuple(
-            (way * weight / (2.0 * step), operator)
-            for way, side in ((1.0, ahead), (-1.0, behind))
-            for weight, operator in side.operators
-        )
-    if not change.any() and not operators:
+    change = stress_stiffness(
+        inputs.scene._model, stiffness.state, stiffness.load_parameters, response, inputs.load_parameters
+    )
+    values = change.triangle[3]
+    if not values.any() and not change.operators and not change.low_rank:
         raise ValueError(
             "the load parameters neither load the scene nor change its stiffness: nothing buckles"
         )
-    largest = np.abs(change).max()
+    largest = np.abs(values).max()
     if not largest < _LARGEST_CHANGE * abs(stiffness.matrix).max():  # NaN too
         raise ValueError(
             f"the load parameters change the stiffness by {largest:g} N/m, beyond what numbers hold: are their units right?"
         )
-    return StiffnessParts((*stiffness.parts.triangle[:3], change), (), operators)
+    return change
+
+
+def _warn_of_displacements(
+    scene: Scene, stiffness: Stiffness, response: np.ndarray, factor: float, quadratic: bool
+) -> None:
+    """Warn if the displacements at a factor are too large for linear theory."""
+    model = scene._model
+    multiple = factor**2 if quadratic else factor
+    found = smallness(scene, model.positions(stiffness.state), model.positions(response))
+    if reason := found.describe(multiple):
+        message = (
+            f"linear buckling takes displacements before buckling to be small, and at the factor {factor:.4g} {reason}: the "
+            "scene softens or stiffens before, and may not buckle there at all. ms.follow_path finds what it does"
+        )
+        warnings.warn(LinearTheoryWarning(message), stacklevel=callers_level())
 
 
 def _lowest(
@@ -330,7 +324,7 @@ def _lowest(
 
 
 class BucklingPencil:
-    """A positive definite K and its change dK without operators: -dK v = (1/f) K v, so that the smallest positive factors f
+    """A positive definite K and its change G without operators: -G v = (1/f) K v, so that the smallest positive factors f
     are the largest eigenvalues.
     """
 
@@ -343,6 +337,9 @@ class BucklingPencil:
         if parts.low_rank:
             self._stiffness = self._operator(lambda v: matrix @ v + parts.times_others(v))
         self._negative_change = -stiffness.with_values(change.triangle[3])
+        if change.low_rank:
+            negative = self._negative_change
+            self._negative_change = self._operator(lambda v: negative @ v - change.times_others(v))
 
     def extreme(self) -> float:
         """Return the inverse of the factor nearest to zero, of either sign, by its size."""

@@ -16,6 +16,7 @@ from ..adjoint.factorized import (
     analyzed,
     factorize,
     stiffness_parts,
+    sum_of_low_rank,
     times_low_rank,
 )
 
@@ -99,7 +100,8 @@ class Stiffness:
         """Return K plus a multiple of a change, both without their operators."""
         *pattern, values = self.parts.triangle
         triangle = (*pattern, values + factor * change.triangle[3])
-        return self.parts._replace(triangle=triangle, operators=())
+        low_rank = sum_of_low_rank(self.parts.low_rank, change.low_rank, factor)
+        return self.parts._replace(triangle=triangle, low_rank=low_rank, operators=())
 
     def negative_directions(self, change: StiffnessParts, factor: float) -> int:
         """Count the negative eigenvalues of K plus a multiple of a change, without operators, by another factorization."""
