@@ -115,7 +115,7 @@ def warn_if_large(result: SolveResult, largest: Largest, where: str, index: tupl
     scene, worst = result.scene, max(largest)
     if is_small(worst) or worst < 2.0 * scene._warned_of_strain:
         return
-    strains = result.strains(*index)
+    strains = result._strains(*index)
     unit = f"{_UNIT_ADVICE} " if worst > _MISTAKEN else ""
     warning = LargeStrainWarning(f"{unit}{where}: {largest}. {_faces(strains)}. {_ADVICE}", result)
     warnings.warn(warning, stacklevel=callers_level())

@@ -104,6 +104,11 @@ def _parts(scene: Scene) -> dict[str, object]:
 _FORMAT = 1
 _KINDS = {each.__name__: each for each in (Equilibrium, EquilibriumSet, Trajectory)}
 _CONTENTS = "contents"
+# Fields that have another name in files: that of the property, which returns tensors in torch's graph.
+_IN_FILES = {
+    f"_{name}": name
+    for name in ("energies", "kinetic_energy", "largest_membrane_strain", "largest_bending_strain")
+}
 
 
 @register_method
@@ -220,7 +225,9 @@ def _fields(result, scene: Scene) -> dict[Any, Any]:
     if isinstance(result, EquilibriumSet):
         return {"_cases": [_fields(case, scene) for case in result]}
     numbers = {id(each): k for k, each in enumerate((scene, *scene.objects))}
-    held = {name: value for name, value in result.__getstate__().items() if name != "scene"}
+    held = {
+        _IN_FILES.get(name, name): value for name, value in result.__getstate__().items() if name != "scene"
+    }
     for name in ("replaced", "paths"):
         if name in held["_values"]:
             held["_values"] = {**held["_values"], name: _numbered(held["_values"][name], numbers)}
@@ -246,13 +253,14 @@ def _made(kind: type[Any], held: dict[Any, Any], scene: Scene):
     if "_varied" in held:
         held["_varied"] = {(objects[number], name): rows for (number, name), rows in held["_varied"].items()}
     check_fits(held, scene)
+    fields = {name: held[_IN_FILES.get(name, name)] for name in kind.__dataclass_fields__.keys() - {"scene"}}
     result = object.__new__(kind)
-    result.__setstate__({"scene": scene, **held})
+    result.__setstate__({"scene": scene, **fields})
     return result
 
 
 def _expected(kind: type[Any]) -> set[str]:
-    return kind.__dataclass_fields__.keys() - {"scene"}
+    return {_IN_FILES.get(name, name) for name in kind.__dataclass_fields__.keys() - {"scene"}}
 
 
 def _names(held, prefix: str = "") -> Iterator[tuple[int, str]]:

@@ -202,7 +202,7 @@ def run(
         raise NotConverged(
             f"step {where}: {found.reason}. {advice} The motion until there is in `error.last_good`.", result
         )
-    bending = result.energies.get("bending", np.zeros(len(result)))
+    bending = result._energies.get("bending", np.zeros(len(result)))
     most = int(np.argmax(bending))
     positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
     where = f"the motion, at {result.times[most]:.4g} s,"
@@ -250,12 +250,14 @@ def _with_strains(result: Trajectory) -> Trajectory:
     """Return the motion with its largest strains computed again, state by state, if sheets grew during it."""
     if not any(isinstance(owner, Shell) for owner, _ in result._varied):
         return result
-    strain = StrainHistory.of_each(result.strains(k) for k in range(len(result)))
-    return replace(result, largest_membrane_strain=strain.membrane, largest_bending_strain=strain.bending)
+    strain = StrainHistory.of_each(result._strains(k) for k in range(len(result)))
+    return replace(
+        result, _largest_membrane_strain=strain.membrane, _largest_bending_strain=strain.bending
+    )
 
 
 def _warn(result: Trajectory) -> None:
-    strain = StrainHistory(result.largest_membrane_strain, result.largest_bending_strain)
+    strain = result._largest_strains
     k = strain.worst
     warn_if_large(
         result, strain.at(k), f"the motion, in recorded state {k}, at {result.times[k]:.6g} s", (k,)
@@ -265,13 +267,13 @@ def _warn(result: Trajectory) -> None:
 def _warn_of_fields(result: Trajectory) -> None:
     """Warn of coarsely sampled fields in the state of largest magnetic energy, where magnets are nearest."""
     if result.scene.own_field is not None:
-        energies = result.energies["own field"]
+        energies = result._energies["own field"]
         for k in sorted({int(np.argmin(energies)), int(np.argmax(energies))}):  # bodies are nearest at one
             where = f"the motion, in recorded state {k}, at {result.times[k]:.6g} s"
             warn_of_gaps(gap_errors(result._values_at(k), result._state_at(k)), where)
     if not result.scene.fields:
         return
-    k = int(np.argmax(np.abs(result.energies.get("magnetic", np.zeros(len(result))))))
+    k = int(np.argmax(np.abs(result._energies.get("magnetic", np.zeros(len(result))))))
     flux_density = result.applied_flux_density
     where = f"the motion, in recorded state {k}, at {result.times[k]:.6g} s"
     state = (
@@ -318,10 +320,10 @@ def _trajectory(motion_inputs: MotionInputs, found, wall_time: float, known=None
         edge_rotations=edge_rotations,
         remanent_magnetization=motion_inputs.inputs.given_magnetization,
         applied_flux_density=motion_inputs.recorded("applied_flux_density", after),
-        kinetic_energy=np.array(found.kinetic_energy),
-        energies=_by_name(model.term_names, by_term),
-        largest_membrane_strain=strain.membrane,
-        largest_bending_strain=strain.bending,
+        _kinetic_energy=np.array(found.kinetic_energy),
+        _energies=_by_name(model.term_names, by_term),
+        _largest_membrane_strain=strain.membrane,
+        _largest_bending_strain=strain.bending,
         steps=motion_inputs.steps,
         steps_done=int(np.searchsorted(grid.grid_ends, found.steps_done, side="right")) - 1,
         substeps={step: len(parts) for step, parts in found.substeps.items() if len(parts) > 1},
