@@ -34,16 +34,16 @@ def several(flux_density):
     return found.positions[0, -1, 2]
 
 
-def energy(places):
-    return ms.energy(PUSHED, places)
+def energy(positions):
+    return ms.energy(PUSHED, positions)
 
 
-def energies(places):
-    return ms.energies(PUSHED, places)["membrane"]
+def energies(positions):
+    return ms.energies(PUSHED, positions)["membrane"]
 
 
-def force(places):
-    return ms.forces(PUSHED, places).on_vertices[-1, 0]
+def force(positions):
+    return ms.forces(PUSHED, positions).on_vertices[-1, 0]
 
 
 def response(flux_density):
@@ -113,7 +113,7 @@ TRACERS = {
 OF_ENERGIES = {each: (ms.NoGradient, "no tangents of energies") for each in ("jvp", "jacfwd", "hessian")}
 NO_SECOND = {"hessian": (ms.NoGradient, "no second derivatives")}
 NO_MAP = {"vmap": (ValueError, "inside torch.vmap")}
-# What is not supported, with the error that says so. Everything else is compared with differences.
+# Transforms that are not supported, with the error that says so. Everything else is compared with differences.
 REFUSED = {
     rest: {},
     moved: {**NO_SECOND, **NO_MAP},

@@ -25,7 +25,6 @@ _GAP = 1e-12  # [-] mean distance from a bound times its force at the end, over 
 _BOUNDARY = 0.995  # [-] share of the way to the nearest bound that an interior step takes at most
 
 
-TRACE=False
 class DenseModel:
     """A linear model of residuals (m,), with their Jacobian (m, n) as a matrix."""
 
@@ -66,16 +65,19 @@ class DenseModel:
         S. Mehrotra, SIAM J. Optim. 2 (1992).
         """
         few = damping < self._regular
-        step = self._settled(damping, lower, upper, _POLISHED if few else _SETS)
+        step = self._active_set(damping, lower, upper, _POLISHED if few else _SETS)
         if step is None:
             found, self._at_low, self._at_high = interior_minimum(
                 self._jacobian, self._residuals, max(damping, self._regular), lower, upper
             )
-            step = self._settled(damping, lower, upper, _POLISHED)
-            step = np.clip(found, lower, upper) if step is None else step
+            at_low, at_high = self._at_low, self._at_high
+            step = self._active_set(damping, lower, upper, _POLISHED)
+            if step is None:
+                inside = np.clip(found, lower, upper)
+                step = np.where(at_low, lower, np.where(at_high, upper, inside))
         return step
 
-    def _settled(self, damping: float, lower: np.ndarray, upper: np.ndarray, sets: int) -> np.ndarray | None:
+    def _active_set(self, damping: float, lower: np.ndarray, upper: np.ndarray, sets: int) -> np.ndarray | None:
         """Return the minimum if at most so many changes of the set of entries at a bound find it, else None."""
         low, high = self._at_low, self._at_high
         for _ in range(sets):
@@ -135,7 +137,6 @@ def interior_minimum(
     for _ in range(_ITERATIONS):
         slope = jacobian.T @ (residuals + jacobian @ step) + damping * step
         mean = float((gap[bounded] * force[bounded]).sum()) / count
-        if TRACE: print(mean, .5*np.sum((residuals+jacobian@step)**2))
         if mean <= _GAP * first:
             break
         inverse = 1.0 / gap
@@ -147,14 +148,14 @@ def interior_minimum(
             return change, target * inverse - force - force * inverse * sides * change  # noqa: B023
 
         change, by_force = toward(0.0)
-        share = _share(sides * change, gap, by_force, force)
-        gap_then, force_then = gap + share * sides * change, force + share * by_force
+        fraction = _fraction(sides * change, gap, by_force, force)
+        gap_then, force_then = gap + fraction * sides * change, force + fraction * by_force
         then = float((gap_then[bounded] * force_then[bounded]).sum()) / count
         centring = max(mean, smallest) * min(1.0, then / max(mean, smallest)) ** 3
         change, by_force = toward(np.where(bounded, centring - sides * change * by_force, 0.0))
-        share = _BOUNDARY * _share(sides * change, gap, by_force, force)
+        fraction = _BOUNDARY * _fraction(sides * change, gap, by_force, force)
         # Distances are added up, as their difference from the bounds would lose all digits.
-        step, gap, force = step + share * change, gap + share * sides * change, force + share * by_force
+        step, gap, force = step + fraction * change, gap + fraction * sides * change, force + fraction * by_force
     # Without its bound an entry would pass it by more than its distance.
     curvature = (jacobian**2).sum(axis=0) + damping
     at = bounded & (gap * curvature < force)
@@ -189,11 +190,11 @@ def _inside(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     return np.clip(0.0, lower + margin, upper - margin)
 
 
-def _share(by_gap: np.ndarray, gap: np.ndarray, by_force: np.ndarray, force: np.ndarray) -> float:
-    """Return the largest share of changes, up to 1, that leaves all gaps and forces positive."""
+def _fraction(by_gap: np.ndarray, gap: np.ndarray, by_force: np.ndarray, force: np.ndarray) -> float:
+    """Return the largest fraction of changes, up to 1, that leaves all gaps and forces positive."""
     falls, weakens = by_gap < 0.0, by_force < 0.0
-    shares = (gap[falls] / -by_gap[falls], force[weakens] / -by_force[weakens])
-    return min(1.0, *(float(each.min(initial=np.inf)) for each in shares))
+    fractions = (gap[falls] / -by_gap[falls], force[weakens] / -by_force[weakens])
+    return min(1.0, *(float(each.min(initial=np.inf)) for each in fractions))
 
 
 def _solved(products: np.ndarray, damping: float, right: np.ndarray) -> np.ndarray:

@@ -44,7 +44,9 @@ def displacements_of(result: Any) -> Any:
     if given is not None and not isinstance(result.positions, np.ndarray):
         return result.positions - given.to(result.positions)
     if isinstance(result.positions, np.ndarray):
-        return result.positions - rest
+        moved = result.positions - rest
+        moved.setflags(write=False)  # as the other arrays of a result
+        return moved
     return result.positions - result.positions.new_tensor(np.array(rest))
 
 

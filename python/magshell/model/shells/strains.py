@@ -39,7 +39,9 @@ class Strains(NamedTuple):
     @property
     def largest(self) -> np.ndarray:
         """The largest magnitude among the four strains of each face, (n_f,)."""
-        return np.abs(np.concatenate(self, axis=1)).max(axis=1)
+        largest = np.abs(np.concatenate(self, axis=1)).max(axis=1)
+        largest.setflags(write=False)  # as the others
+        return largest
 
 
 class Largest(NamedTuple):

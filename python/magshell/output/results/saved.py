@@ -45,8 +45,30 @@ def check_fits(held: dict[Any, Any], scene: Scene) -> None:
     shapes["_own_points"] = (*n, own, 3)
     for name, shape in shapes.items():
         optional = name in ("_own_points", "_own_velocities", "applied_flux_density")
-        if not (optional and held[name] is None):
-            quantity(name, "SI", held[name], shape)
+        if optional and held[name] is None:
+            continue
+        quantity(name, "SI", held[name], shape)
+        if (kind := np.asarray(held[name]).dtype.kind) != "f":
+            raise ValueError(f"{name} holds numbers of kind {kind!r} instead of real ones")
+    if of_motion and (np.diff(held["times"]) <= 0.0).any():
+        raise ValueError("its times do not rise")
+    _check_positions(held, model)
+
+
+def _check_positions(held: dict[Any, Any], model) -> None:
+    """Raise ValueError if the positions are not those of the state in the core, which solves continue from."""
+    positions = held["positions"]
+    if "times" in held:
+        if not len(positions) or abs(held["times"][-1] - held["end"].time) > 1e-9 * abs(held["end"].time):
+            return  # the end was not recorded
+        positions, state = positions[-1], held["end"].state
+    else:
+        state = held["_state"]
+    there = model.positions(state)
+    # Positions of single precision are rounded.
+    close = 16.0 * np.finfo(np.asarray(positions).dtype).eps * max(float(np.abs(there).max(initial=0.0)), 1e-300)
+    if not np.abs(positions - there).max(initial=0.0) <= close:
+        raise ValueError("its positions are not those of its state")
 
 
 def _n_directions(scene: Scene) -> int:

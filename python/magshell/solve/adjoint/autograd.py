@@ -385,6 +385,10 @@ class _Mapped(torch.autograd.Function):
 
     @staticmethod
     def vmap(info: Any, in_dims: tuple[Any, ...], solves: Any, *tensors: torch.Tensor) -> tuple[Any, Any]:
+        if any(map(is_batched, tensors)):
+            raise ValueError(
+                "torch.vmap inside of torch.vmap: reshape both axes to one, map once, and reshape the results"
+            )
         found = solves.solve(_in_front(info.batch_size, in_dims[1:], tensors))
         return found, (0,) * len(found)
 

@@ -17,6 +17,7 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.fields.magnets import describe_magnet_overlap
+from ...model.results.crossings import crossing_bodies
 from ...model.scene.field_sampling import (
     element_errors,
     sampling_errors,
@@ -43,6 +44,7 @@ from ..options import (
     SDIRK3,
     Adaptive,
     AdjointStorage,
+    ImplicitEuler,
     Integrator,
     Newton,
     ProjectiveDynamics,
@@ -143,22 +145,28 @@ def preparation(
     return prepared
 
 
+def _ignore(text: str) -> None:
+    """Discard a note on the progress."""
+
+
+
 def run(
     scene: Scene,
     arguments: dict[str, Any],
     options: MotionOptions,
     progress: Callable[[float], None],
+    note: Callable[[str], None] = _ignore,
 ) -> Motion:
     """Simulate one motion, with the arguments and the errors of ms.simulate.
 
-    progress: called now and then with the fraction that is done.
+    progress: called now and then with the fraction that is done. note: called once if many steps are taken in parts.
     """
     time_step = arguments["time_step"]
     prepared = preparation(scene, arguments, options)
     motion_inputs = prepared(None)
     scene = motion_inputs.inputs.scene  # another scene if values replace rest positions
     began = time.perf_counter()
-    watch = stop_at_once if motion_inputs.interrupted else lambda fraction, residual: progress(fraction)
+    watch = stop_at_once if motion_inputs.interrupted else Watch(progress, note)
     along = None if isinstance(time_step, Adaptive) else _requested_tangents(motion_inputs)
     known = None
     check_magnets_apart(scene, scene._model.positions(motion_inputs.start.state))
@@ -198,7 +206,7 @@ def run(
         if isinstance(time_step, Adaptive):
             shortest = motion_inputs.time_steps.clock.time_step / 2**time_step._deepest
             where = f"{found.steps_done}, at {result.end.time:.6g} s, failed even with a length of {shortest:.3g} s"
-        advice = _advice(result, isinstance(time_step, Adaptive))
+        advice = _advice(result, isinstance(time_step, Adaptive), found.reason)
         raise NotConverged(
             f"step {where}: {found.reason}. {advice} The motion until there is in `error.last_good`.", result
         )
@@ -217,6 +225,21 @@ def run(
     return Motion(result, motion_inputs, found)
 
 
+class Watch:
+    """Passes on what the core reports while it takes steps: the fraction that is done, and once, in a note, the shortest part
+    [s] of many divided steps.
+    """
+
+    def __init__(self, progress: Callable[[float], None], note: Callable[[str], None]):
+        self._progress, self._note, self._told = progress, note, False
+
+    def __call__(self, fraction: float, shortest_part: float) -> None:
+        if shortest_part > 0.0 and not self._told:
+            self._told = True
+            self._note(f"ten steps were too long and divided: steps of {shortest_part:.2g} s would do")
+        self._progress(fraction)
+
+
 def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
     """Return the scene with the rest positions among the values, and the values by its objects; raise as `reshaped` does.
 
@@ -233,10 +256,20 @@ def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
     return there, values
 
 
-def _advice(result: Trajectory, chosen: bool) -> str:
-    """Return the advice for an error message about a step that failed. chosen: by ms.Adaptive."""
+def _advice(result: Trajectory, chosen: bool, reason: str) -> str:
+    """Return the advice for an error message about a step that failed, and why. chosen: by ms.Adaptive."""
     fields = map(result._values_at(len(result) - 1).current, result.scene.fields)
     positions = np.asarray(detached(result.positions[-1]), dtype=np.float64)
+    if result.scene.own_field is not None and (met := crossing_bodies(result.scene, positions)):
+        return (
+            f"{met} attract each other by their own field and have met: nothing but an ms.Contact of the two keeps them "
+            "apart."
+        )
+    if "forces of friction" in reason and isinstance(result.integrator, ImplicitEuler):
+        return (
+            "Take the default integrator, ms.TRBDF2(implicit_contact=True), which finds them in longer steps, shorter "
+            "steps, or Contact(lagged_friction=True)."
+        )
     overlap = describe_magnet_overlap(fields, positions, result.scene.mesh.edge_lengths)
     if overlap or not chosen:
         return overlap or "Take shorter steps."

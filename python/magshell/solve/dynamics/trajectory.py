@@ -17,11 +17,11 @@ from ..._runtime.files import replace_file
 from ..._runtime.frozen import FixedDict, immutable
 from ..._runtime.mixins import AnimateMixin
 from ..._runtime.npz import open_npz
-from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.attached_obstacles import positioned
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.contact.contacts_to_core import near_kinks
+from ...model.results.crossings import describe_crossings
 from ...model.results.result_lookup import OfOneBody, displacements_of, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
@@ -251,7 +251,9 @@ class Trajectory(AnimateMixin, OfOneBody):
 
     @property
     def _energy(self) -> np.ndarray:
-        return self._kinetic_energy + sum(self._energies.values())
+        energy = self._kinetic_energy + sum(self._energies.values())
+        energy.setflags(write=False)  # as the other arrays
+        return energy
 
     @property
     def energies(self) -> Computed:
@@ -396,7 +398,7 @@ class Trajectory(AnimateMixin, OfOneBody):
             if self.energy_watched
             else "  gains of energy in contact were not watched for, because of follower loads\n"
         )
-        crossings = describe_self_intersections(self.scene.mesh, detached(self.positions))
+        crossings = describe_crossings(self.scene, detached(self.positions))
         taken = len(self.time_steps)
         a_step = 1e3 * self.wall_time / max(taken, 1)
         method = repr(self.integrator).removesuffix("()")

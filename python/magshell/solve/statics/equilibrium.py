@@ -11,9 +11,9 @@ from ..._input.tensors import detached, plain_arrays
 from ..._input.without_gradient import without_gradient
 from ..._runtime.frozen import FixedDict, immutable
 from ..._runtime.mixins import SaveMixin
-from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
+from ...model.results.crossings import describe_crossings
 from ...model.results.result_lookup import OfOneBody, displacements_of, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ...model.solids.solid import Solid
 
 
-# What has the gradients that the energies of a result have not.
+# For messages: the energies of a result have no gradients, and these functions have.
 INSTEAD_OF_ENERGIES = (
     "ms.energy and ms.energies have one, at result.positions and result.edge_rotations with the values of the solve"
 )
@@ -256,7 +256,7 @@ class Equilibrium(SaveMixin, OfOneBody):
         if self.load_fraction < 1.0:
             kind += f", {self.load_fraction:.1%} of the way"
         energies = ", ".join(f"{name} {value:.4g}" for name, value in self._energies.items())
-        crossings = describe_self_intersections(self.scene.mesh, np.asarray(detached(self.positions))[None])
+        crossings = describe_crossings(self.scene, np.asarray(detached(self.positions))[None])
         extra = f", {self.saddles_escaped} saddles left" if self.saddles_escaped else ""
         tie = (
             "\n  round-off decided how an unstable state was left: result.branches has starts for the other ways, "

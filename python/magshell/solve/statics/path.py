@@ -21,8 +21,8 @@ from ..._runtime.progress import SolveBar, stop_at_once
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
-from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.watched_obstacles import watched_obstacles
+from ...model.results.crossings import describe_crossings
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.element_sampling import has_elements
@@ -281,7 +281,7 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
             for event in self.events
         ]
         lines.append(f"  {describe_strains(self, self._largest_strains)}")
-        lines.append(f"  {describe_self_intersections(self.scene.mesh, self.positions)}")
+        lines.append(f"  {describe_crossings(self.scene, self.positions)}")
         lines.append(
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s"
         )
