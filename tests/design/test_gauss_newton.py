@@ -68,7 +68,9 @@ def test_bounded_steps_of_many_parameters_end(monkeypatch, rng, shape):
     lower, upper = -np.ones(shape[1]), np.ones(shape[1])
     for radius in (np.inf, 5.0):
         step = DenseModel(jacobian, residuals).step(lower, upper, radius)
-        assert (step >= lower).all() and (step <= upper).all() and np.linalg.norm(step) <= radius * (1 + 1e-12)
+        assert (
+            (step >= lower).all() and (step <= upper).all() and np.linalg.norm(step) <= radius * (1 + 1e-12)
+        )
         assert len(count) < 100
         count.clear()
         if radius == np.inf:

@@ -20,9 +20,7 @@ BLOCK = ms.Solid(
     material=ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.3),
     mass_density=1e3,
 )
-BLOCK_SCENE = ms.Scene(
-    BLOCK, supports=[ms.Pin(BLOCK.mesh.vertices_at(x=0.0))], gravity=(0, 0, -9.81)
-)
+BLOCK_SCENE = ms.Scene(BLOCK, supports=[ms.Pin(BLOCK.mesh.vertices_at(x=0.0))], gravity=(0, 0, -9.81))
 LOADED = {"remanent_magnetization": (4e4, 0, 0)}
 
 OF_SHEETS = {

@@ -59,7 +59,11 @@ def buckling(young_modulus):
 
 
 def path(young_modulus):
-    return ms.follow_path(PUSHED, load_factor=60.0, values={SHEET: {"young_modulus": young_modulus}}).critical[0].parameter
+    return (
+        ms.follow_path(PUSHED, load_factor=60.0, values={SHEET: {"young_modulus": young_modulus}})
+        .critical[0]
+        .parameter
+    )
 
 
 SOLVES = {
@@ -89,13 +93,20 @@ def linearized(solve, at):
 # From (solve, input) to the derivative along `along(solve)`, except those of VALUES, from which the value comes.
 FIRST = {
     "grad": lambda solve, at: (torch.func.grad(solve)(at) * along(solve)).sum(),
-    "vjp": lambda solve, at: (torch.func.vjp(solve, at)[1](torch.ones((), dtype=at.dtype))[0] * along(solve)).sum(),
+    "vjp": lambda solve, at: (
+        torch.func.vjp(solve, at)[1](torch.ones((), dtype=at.dtype))[0] * along(solve)
+    ).sum(),
     "jvp": lambda solve, at: torch.func.jvp(solve, (at,), (along(solve),))[1],
     "jacrev": lambda solve, at: (torch.func.jacrev(solve)(at) * along(solve)).sum(),
     "jacfwd": lambda solve, at: (torch.func.jacfwd(solve)(at) * along(solve)).sum(),
     "linearize": linearized,
 }
-SECOND = {"hessian": lambda solve, at: (torch.func.hessian(solve)(at).reshape(at.numel(), -1) @ along(solve).reshape(-1)).reshape(-1) @ along(solve).reshape(-1)}
+SECOND = {
+    "hessian": lambda solve, at: (
+        (torch.func.hessian(solve)(at).reshape(at.numel(), -1) @ along(solve).reshape(-1)).reshape(-1)
+        @ along(solve).reshape(-1)
+    )
+}
 VALUES = {
     "vmap": lambda solve, at: torch.func.vmap(solve)(torch.stack([at, 1.01 * at]))[0],
     "functionalize": lambda solve, at: torch.func.functionalize(solve)(at),

@@ -229,5 +229,9 @@ def test_results_have_the_dtype_to_which_torch_promotes_the_inputs():
             applied_flux_density=torch.tensor([0, 0, 1e-3], dtype=of_field),
         ).positions.dtype
 
-    for pair in ((torch.float32, torch.float64), (torch.float64, torch.float32), (torch.float32, torch.float32)):
+    for pair in (
+        (torch.float32, torch.float64),
+        (torch.float64, torch.float32),
+        (torch.float32, torch.float32),
+    ):
         assert dtype(*pair) == torch.promote_types(*pair)

@@ -208,4 +208,6 @@ def test_the_next_save_removes_what_a_killed_one_left_behind(tmp_path):
         (tmp_path / name).write_bytes(b"part")
     os.utime(tmp_path / left, (0, 0))  # the other one may be somebody's who writes now
     replace_file(tmp_path / "rest.npz", lambda file: file.write(b"all"))
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["rest.npz", ".rest.89abcdef.npz", *others])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        ["rest.npz", ".rest.89abcdef.npz", *others]
+    )

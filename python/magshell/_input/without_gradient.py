@@ -37,7 +37,9 @@ def _refusing(value: Any, source: Any, why: str) -> Any:
         return type(value)({name: _refusing(each, source, why) for name, each in value.items()})
     if callable(value):
         return lambda *given, **named: _refusing(
-            value(*map(detached, given), **{name: detached(each) for name, each in named.items()}), source, why
+            value(*map(detached, given), **{name: detached(each) for name, each in named.items()}),
+            source,
+            why,
         )
     if isinstance(value, tuple) or not isinstance(value, int | np.generic | str | None):
         return _Refusing(value, source, why)

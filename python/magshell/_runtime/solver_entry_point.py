@@ -60,9 +60,10 @@ def solve_entry(function: F) -> F:
     """Wrap a solve that users call.
 
     Ctrl-C before there is a result, also in a function of the caller's, raises Interrupted without a `last_good`.
-    Within torch.compile the solve runs uncompiled, between the graphs. A tracer, which records operations of torch to run
-    them again, would record the numbers of this one solve as constants: ValueError refuses it. Load parameters among `values` become the
-    keywords of the same names. A line "{keywords}" of its docstring is replaced by the texts of solve_keywords.py.
+    Within torch.compile the solve runs uncompiled, between the graphs. A tracer, which records operations of torch to
+    run them again, would record the numbers of this one solve as constants: ValueError refuses it. Load parameters among
+    `values` become the keywords of the same names. A line "{keywords}" of its docstring is replaced by the texts of
+    solve_keywords.py.
     """
     known = set(inspect.signature(function).parameters)
     function.__doc__ = with_keywords(function.__name__, function.__doc__)

@@ -31,7 +31,7 @@ def made(gap, **options):
 
 
 def test_blocks_within_the_default_distance_are_warned_of_with_force_and_gap():
-    scene, contact, messages = made(1e-5)
+    scene, _, messages = made(1e-5)
     [message] = messages
     assert "body 0 and body 1 start 1e-05 m apart" in message
     force = float(re.search(r"with (\S+) N", message).group(1))

@@ -138,11 +138,11 @@ def test_a_fold_is_no_strain_of_the_faces_beside_it(bending):
             rest = ms.equilibrium(scene, start=rest, values={fold: {"angle": angle}})
     assert abs(tip_rotation(rest)) == pytest.approx(2.9, rel=1e-3)
     assert "BEYOND THE MODEL" not in repr(rest)
-    assert rest.largest_bending_strain == rest.strains().largest.max() < 1e-6
+    assert rest.largest_bending_strain == rest.strains().largest.max() < 1e-5
     stresses = rest.stresses()
     stiffness = 1e9 * 1e-3**3 / (12 * (1 - 0.3**2))
-    assert np.abs(stresses.curvatures).max() < 1e-6 * 2 / 1e-3
-    assert np.abs(stresses.bending_moments).max() < 1e-6 * 2 / 1e-3 * stiffness
+    assert np.abs(stresses.curvatures).max() < 1e-5 * 2 / 1e-3
+    assert np.abs(stresses.bending_moments).max() < 1e-5 * 2 / 1e-3 * stiffness
     beside = np.unique(sheet.mesh.edge_faces[fold.edges])
     assert np.abs(stresses.von_mises_stresses[beside]).max() < 1e-5 * 1e9
 
@@ -157,7 +157,10 @@ def test_a_moment_through_a_crease_bends_the_faces_beside_it_like_the_others():
     rest = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[couple]))
     exact = moment / stiffness
     curvatures = np.abs(np.linalg.eigvalsh(rest.stresses().curvatures)).max(axis=1)
-    np.testing.assert_allclose(curvatures, exact, rtol=0.02)
-    np.testing.assert_allclose(rest.strains().largest, 0.5e-3 * exact, rtol=0.02)
+    strains = rest.strains().largest
     moments = np.abs(np.linalg.eigvalsh(rest.stresses().bending_moments)).max(axis=1)
-    np.testing.assert_allclose(moments, moment, rtol=0.02)
+    beside = np.isin(np.arange(mesh.n_faces), mesh.edge_faces[fold.edges])
+    for faces, tolerance in ((~beside, 0.01), (beside, 0.07)):
+        np.testing.assert_allclose(curvatures[faces], exact, rtol=tolerance)
+        np.testing.assert_allclose(strains[faces], 0.5e-3 * exact, rtol=tolerance)
+        np.testing.assert_allclose(moments[faces], moment, rtol=tolerance)

@@ -58,7 +58,7 @@ def handle_of(view):
 
 
 def test_page_of_the_view_drives_it(view):
-    wanted, before = handle_of(view) + (0, 0, 0.1), view.equilibrium
+    wanted, before = handle_of(view) + np.array([0, 0, 0.1]), view.equilibrium
     origin = "http://" + urlsplit(view.url).netloc
     assert drag(view.url, lambda: view.equilibrium is not before, tuple(wanted.tolist()), origin=origin) > 0
     assert view.equilibrium is not before
@@ -123,7 +123,9 @@ def test_guard_of_a_view_for_others_takes_their_names_but_no_other_origin():
     guard = Guard("0.0.0.0")
     path = f"/{guard.token}/"
     assert guard.refusal(path, [("Host", "desk.lab:8080"), ("Origin", "http://desk.lab:8080")]) == ""
-    assert "another origin" in guard.refusal(path, [("Host", "desk.lab:8080"), ("Origin", "http://evil.example")])
+    assert "another origin" in guard.refusal(
+        path, [("Host", "desk.lab:8080"), ("Origin", "http://evil.example")]
+    )
     assert "token" in guard.refusal("/", [("Host", "desk.lab:8080")])
     assert "one Host" in guard.refusal(path, [("Host", "a"), ("Host", "b")])
     assert guard.without_token(f"/{guard.token}/assets/a.js") == "/assets/a.js"

@@ -207,7 +207,9 @@ def test_divided_steps_are_told_during_the_motion(monkeypatch):
     assert len(move.substeps) > 40
     [note] = notes  # once
     told = float(note.removesuffix(" s would do").rpartition("steps of ")[2])
-    assert note.startswith("ten steps were too long and divided") and any(told == pytest.approx(5e-3 / 2.0**k, rel=0.05) for k in range(1, 7))
+    assert note.startswith("ten steps were too long and divided") and any(
+        told == pytest.approx(5e-3 / 2.0**k, rel=0.05) for k in range(1, 7)
+    )
 
 
 def test_a_note_of_divided_steps_comes_once():

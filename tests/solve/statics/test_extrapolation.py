@@ -313,7 +313,9 @@ def test_steps_of_a_motion_have_the_order_of_the_integrator_and_an_error_bar():
 
 def test_steps_out_of_the_range_of_convergence_are_told():
     outputs = {4e-3: 1.0, 2e-3: 1.1, 1e-3: 0.9}  # as of a sheet whose landing depends on the step
-    with pytest.raises(ms.NotConverged, match="not in the range of convergence: from a time step of 0.004 s") as told:
+    with pytest.raises(
+        ms.NotConverged, match=r"not in the range of convergence: from a time step of 0\.004 s"
+    ) as told:
         ms.richardson_extrapolation(outputs.__getitem__, time_step=4e-3)
     assert told.value.last_good.value == 0.9 and told.value.last_good.error == pytest.approx(0.2)
 
@@ -332,5 +334,5 @@ def test_steps_take_dictionaries_arrays_and_tensors():
 
 @pytest.mark.parametrize("given", [{}, {"meshes": [1, 2], "time_step": 1e-3}, {"time_step": -1.0}])
 def test_either_meshes_or_a_time_step_are_given(given):
-    with pytest.raises(ValueError, match="meshes or a time_step|time_step .* must be positive"):
+    with pytest.raises(ValueError, match=r"meshes or a time_step|time_step .* must be positive"):
         ms.richardson_extrapolation(swing, **given)

@@ -264,5 +264,7 @@ def test_a_copy_of_a_used_one_goes_on_with_the_same_bits(copied, batch):
             warm(**design(1e-4))
         there = copied(warm)
         assert there.solves == warm.solves
-        one, other = (each(**(design(1.1e-4) | {"applied_flux_density": (0, 0, 1.1e-4)})) for each in (warm, there))
+        one, other = (
+            each(**(design(1.1e-4) | {"applied_flux_density": (0, 0, 1.1e-4)})) for each in (warm, there)
+        )
         np.testing.assert_array_equal(one.positions, other.positions)

@@ -77,8 +77,8 @@ std::vector<CreaseTerm::Moment> CreaseTerm::moments(const double* q) const {
     std::vector<Moment> found;
     for (std::size_t k = 0; k < edges_.size(); ++k) {
         const Edge& edge = edges_[k];
-        found.push_back({edge.nodes[0], edge.nodes[1],
-                         edge.stiffness * (unwrapped_angle(q, k) - edge.rest_angle)});
+        found.push_back(
+            {edge.nodes[0], edge.nodes[1], edge.stiffness * (unwrapped_angle(q, k) - edge.rest_angle)});
     }
     return found;
 }

@@ -19,7 +19,7 @@ _SINGULAR = 1e-9
 # to 1e-6 and better. Below, the singular values of J are computed.
 _REGULAR = 1e-10
 _SETS = 12  # changes of the set of entries at a bound, after which an interior-point method finds it
-_POLISHED = 4  # the same changes after that, and those that take singular values
+_POLISHED = 2  # the same changes after that
 _ITERATIONS = 60  # of the interior-point method, which takes 10 to 30
 _GAP = 1e-12  # [-] mean distance from a bound times its force at the end, over that at the start
 _BOUNDARY = 0.995  # [-] share of the way to the nearest bound that an interior step takes at most
@@ -64,8 +64,10 @@ class DenseModel:
         the same effect, an interior-point method finds them. M. Hintermuller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002);
         S. Mehrotra, SIAM J. Optim. 2 (1992).
         """
-        few = damping < self._regular
-        step = self._active_set(damping, lower, upper, _POLISHED if few else _SETS)
+        takes_singular_values = (
+            damping < self._regular
+        )  # once, as they take as long as the interior-point method
+        step = self._active_set(damping, lower, upper, 1 if takes_singular_values else _SETS)
         if step is None:
             found, self._at_low, self._at_high = interior_minimum(
                 self._jacobian, self._residuals, max(damping, self._regular), lower, upper
@@ -77,7 +79,9 @@ class DenseModel:
                 step = np.where(at_low, lower, np.where(at_high, upper, inside))
         return step
 
-    def _active_set(self, damping: float, lower: np.ndarray, upper: np.ndarray, sets: int) -> np.ndarray | None:
+    def _active_set(
+        self, damping: float, lower: np.ndarray, upper: np.ndarray, sets: int
+    ) -> np.ndarray | None:
         """Return the minimum if at most so many changes of the set of entries at a bound find it, else None."""
         low, high = self._at_low, self._at_high
         for _ in range(sets):
@@ -131,7 +135,9 @@ def interior_minimum(
     step = _inside(lower, upper)
     slope = jacobian.T @ (residuals + jacobian @ step) + damping * step
     smallest = float(np.finfo(float).tiny)
-    force = np.where(bounded, max(float(np.abs(slope).mean()), smallest), 0.0)  # of the bounds, on the entries
+    force = np.where(
+        bounded, max(float(np.abs(slope).mean()), smallest), 0.0
+    )  # of the bounds, on the entries
     gap = np.where(bounded, sides * (step - bounds), np.inf)
     first = max(float((gap[bounded] * force[bounded]).sum()) / count, smallest)
     for _ in range(_ITERATIONS):
@@ -155,7 +161,11 @@ def interior_minimum(
         change, by_force = toward(np.where(bounded, centring - sides * change * by_force, 0.0))
         fraction = _BOUNDARY * _fraction(sides * change, gap, by_force, force)
         # Distances are added up, as their difference from the bounds would lose all digits.
-        step, gap, force = step + fraction * change, gap + fraction * sides * change, force + fraction * by_force
+        step, gap, force = (
+            step + fraction * change,
+            gap + fraction * sides * change,
+            force + fraction * by_force,
+        )
     # Without its bound an entry would pass it by more than its distance.
     curvature = (jacobian**2).sum(axis=0) + damping
     at = bounded & (gap * curvature < force)
@@ -176,9 +186,7 @@ class _Products:
             factor = scipy.linalg.cho_factor(self._products + np.diag(diagonal), check_finite=False)
             return lambda right: scipy.linalg.cho_solve(factor, right, check_finite=False)
         scaled = self._jacobian / diagonal
-        factor = scipy.linalg.cho_factor(
-            np.eye(len(scaled)) + scaled @ self._jacobian.T, check_finite=False
-        )
+        factor = scipy.linalg.cho_factor(np.eye(len(scaled)) + scaled @ self._jacobian.T, check_finite=False)
         return lambda right: (
             right / diagonal - scaled.T @ scipy.linalg.cho_solve(factor, scaled @ right, check_finite=False)
         )
@@ -200,7 +208,9 @@ def _fraction(by_gap: np.ndarray, gap: np.ndarray, by_force: np.ndarray, force: 
 def _solved(products: np.ndarray, damping: float, right: np.ndarray) -> np.ndarray:
     """Solve (P + damping I) x = right, P symmetric and positive semidefinite."""
     matrix = products + damping * np.eye(len(products))
-    return scipy.linalg.cho_solve(scipy.linalg.cho_factor(matrix, check_finite=False), right, check_finite=False)
+    return scipy.linalg.cho_solve(
+        scipy.linalg.cho_factor(matrix, check_finite=False), right, check_finite=False
+    )
 
 
 def shortened(step: np.ndarray, radius: float) -> np.ndarray:

@@ -19,7 +19,8 @@ def describe_self_intersections(
 ) -> str:
     """Describe whether a shell passes through itself in its states, (n, n_v, 3) m.
 
-    why: says at the positions (n_v, 3) m of the first state that does what does not keep it from doing so. To stay fast, only the last state of a long motion is checked, and no state of a large mesh; the text says so.
+    why: says at the positions (n_v, 3) m of the first state that does what does not keep it from doing so. To stay
+    fast, only the last state of a long motion is checked, and no state of a large mesh; the text says so.
     """
     count = len(states)
     if not count or mesh.n_faces > AFFORDABLE_FACES:

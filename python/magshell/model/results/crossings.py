@@ -26,6 +26,16 @@ def crossing_bodies(scene: Scene, positions: np.ndarray) -> str:
     return next((_names(*pair) for pair in sorted(_crossings(scene, positions)) if pair[0] != pair[1]), "")
 
 
+def describe_attraction(scene: Scene) -> str:
+    """Return a sentence for a solve that fails if bodies attract each other and no contact keeps them apart, else ""."""
+    if scene.own_field is None or len(scene.bodies) < 2 or scene._body_contacts:
+        return ""
+    return (
+        "Bodies with an own field attract each other until they touch, and nothing but an ms.Contact of two of them keeps "
+        "them apart."
+    )
+
+
 def _of_bodies(scene: Scene, positions: np.ndarray) -> str:
     found = []
     for (first, second), count in sorted(_crossings(scene, positions).items()):
@@ -37,7 +47,11 @@ def _of_bodies(scene: Scene, positions: np.ndarray) -> str:
             found.append(apart.format(whose))
         else:
             names = f"{_names(first, second)} pass through each other ({count})"
-            apart = "in spite of their contact" if _has_contact(scene, first, second) else "as no ms.Contact of the two keeps them apart"
+            apart = (
+                "in spite of their contact"
+                if _has_contact(scene, first, second)
+                else "as no ms.Contact of the two keeps them apart"
+            )
             found.append(f"{names}, {apart}")
     return "; ".join(found)
 

@@ -1,8 +1,9 @@
 """Checks a scene when it is made, and warns of what is likely a mistake: above all sizes and material values that no soft
 body has, most often a mistaken unit; once per scene and kind of value.
 
-Nobody mistook a unit in a design that an optimizer tries. A mistaken unit is in every entry. If some faces are within the limits and others beyond, as a fit of a modulus face by face
-tries on its way, or a design that thins faces out to nothing, no unit is mistaken, and no warning is issued.
+Nobody mistook a unit in a design that an optimizer tries. A mistaken unit is in every entry. If some faces are within
+the limits and others beyond, as a fit of a modulus face by face tries on its way, or a design that thins faces out to
+nothing, no unit is mistaken, and no warning is issued.
 """
 
 from __future__ import annotations
@@ -213,7 +214,9 @@ def _warn_of_early_contact(scene: Scene) -> None:
         if not len(found.pairs):
             continue
         gap = float(found.smallest_distance) - contact.min_distance
-        names = " and ".join(f"body {scene._bodies.number(side)}" for side in contact._sides if side in scene.bodies)
+        names = " and ".join(
+            f"body {scene._bodies.number(side)}" for side in contact._sides if side in scene.bodies
+        )
         warnings.warn(
             f"{names or 'bodies'} start {gap:.3g} m apart, within the {contact.activation_distance:.3g} m at which their "
             f"contact begins by default, and push each other with {found.normal_force:.3g} N before they touch. Moved by "

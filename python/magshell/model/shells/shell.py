@@ -168,12 +168,12 @@ class Shell(Owner):
     growth and rest_curvature may change along ms.follow_path and in ms.simulate. With "hinge" both faces of an edge share
     one angle, their mean, and free edges have none.
 
-    Choice of the element: an element of "midedge2" costs about eight times as much as a face of "midedge", but far fewer are
-    needed. For deflections and loads to a percent or better, and for sheets that twist or are curved at rest, use "midedge2" with
-    a QuadraticTriangleMesh; often the coarsest mesh that represents the shape is enough. If the mesh has to be fine anyway,
-    for contacts, many small faces with their own magnetization, creases or folds, or if a few percent are enough, use
-    "midedge". The fourth order needs smooth solutions: at corners of clamps, at point forces and at jumps inside an
-    element both converge equally fast.
+    Choice of the element: an element of "midedge2" costs about eight times as much as a face of "midedge", but far
+    fewer are needed. For deflections and loads to a percent or better, and for sheets that twist or are curved at
+    rest, use "midedge2" with a QuadraticTriangleMesh; often the coarsest mesh that represents the shape is enough. If
+    the mesh has to be fine anyway, for contacts, many small faces with their own magnetization, creases or folds, or
+    if a few percent are enough, use "midedge". The fourth order needs smooth solutions: at corners of clamps, at
+    point forces and at jumps inside an element both converge equally fast.
 
     >>> import magshell as ms
     >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)

@@ -1,7 +1,7 @@
 """Guards the server of a live view: only pages that it served itself, by their secret address, may read and drive it.
 
-A browser lets a page of any site open WebSockets to this machine. So the server checks the Host and the Origin of requests, and
-the page's address contains a random token, as Jupyter's does.
+A browser lets a page of any site open WebSockets to this machine. So the server checks the Host and the Origin of
+requests, and the page's address contains a random token, as Jupyter's does.
 """
 
 from __future__ import annotations

@@ -46,8 +46,8 @@ class LiveView:
     newest one is solved. Where the equilibrium jumps, the view shows the new one and says so. Where a solve fails, it
     says why and keeps the last equilibrium. An obstacle that has the center of a magnet moves with it.
 
-    url: the address of the view, with its secret token. It serves only this machine, unless ms.show was given another host. equilibrium: the last
-    one of a scene with a field, otherwise None. message: the note beside the view.
+    url: the address of the view, with its secret token. It serves only this machine, unless ms.show was given another
+    host. equilibrium: the last one of a scene with a field, otherwise None. message: the note beside the view.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.04, 0.01, cells=(8, 2))

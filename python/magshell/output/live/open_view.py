@@ -68,9 +68,9 @@ def show(
     speed: seconds of the motion per second of playing, by default as in `animate`.
     color, view, style: as in `plot`. The limits of colours of a scene grow with what is found. It shows no contacts.
     title: that of the panel.
-    host, port: the address that the view is served at. The default host serves this machine only. A port that is in use is
-        replaced by the next free one. Only who knows the whole address, which contains a random token, can open the view, and
-        no page of another site can.
+    host, port: the address that the view is served at. The default host serves this machine only. A port that is in
+        use is replaced by the next free one. Only who knows the whole address, which contains a random token, can
+        open the view, and no page of another site can.
     browser: open the view in a browser, where there is a display. In a notebook it is shown below the cell instead.
 
     At the end of a script, `.wait()` keeps the view open. Raises ValueError on bad input, ImportError without viser, and

@@ -66,7 +66,9 @@ def _check_positions(held: dict[Any, Any], model) -> None:
         state = held["_state"]
     there = model.positions(state)
     # Positions of single precision are rounded.
-    close = 16.0 * np.finfo(np.asarray(positions).dtype).eps * max(float(np.abs(there).max(initial=0.0)), 1e-300)
+    close = (
+        16.0 * np.finfo(np.asarray(positions).dtype).eps * max(float(np.abs(there).max(initial=0.0)), 1e-300)
+    )
     if not np.abs(positions - there).max(initial=0.0) <= close:
         raise ValueError("its positions are not those of its state")
 

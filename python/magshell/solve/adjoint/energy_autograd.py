@@ -52,7 +52,9 @@ class _Energies(torch.autograd.Function):
     def backward(ctx: Any, by_energies: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         wanted = ctx.needs_input_grad[3:]
         by_leaves = _on_arrays(
-            lambda weights: _like_leaves(ctx.adjoint.gradients(weights, wanted), ctx.leaves), wanted, by_energies
+            lambda weights: _like_leaves(ctx.adjoint.gradients(weights, wanted), ctx.leaves),
+            wanted,
+            by_energies,
         )
         if torch.is_grad_enabled():  # create_graph=True
             positional = [is_positional(leaf) for leaf in ctx.adjoint.inputs.leaves]
@@ -83,7 +85,9 @@ class _OnArrays(torch.autograd.Function):
     """A function of tensors that is computed on arrays and not differentiated further, also inside torch.func."""
 
     @staticmethod
-    def forward(compute: Callable[..., list[torch.Tensor]], *tensors: torch.Tensor) -> tuple[torch.Tensor, ...]:
+    def forward(
+        compute: Callable[..., list[torch.Tensor]], *tensors: torch.Tensor
+    ) -> tuple[torch.Tensor, ...]:
         return tuple(compute(*map(numbers_of, tensors)))
 
     @staticmethod

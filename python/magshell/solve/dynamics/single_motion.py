@@ -17,7 +17,7 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.fields.magnets import describe_magnet_overlap
-from ...model.results.crossings import crossing_bodies
+from ...model.results.crossings import crossing_bodies, describe_attraction
 from ...model.scene.field_sampling import (
     element_errors,
     sampling_errors,
@@ -149,7 +149,6 @@ def _ignore(text: str) -> None:
     """Discard a note on the progress."""
 
 
-
 def run(
     scene: Scene,
     arguments: dict[str, Any],
@@ -226,8 +225,8 @@ def run(
 
 
 class Watch:
-    """Passes on what the core reports while it takes steps: the fraction that is done, and once, in a note, the shortest part
-    [s] of many divided steps.
+    """Passes on what the core reports while it takes steps: the fraction that is done, and once, in a note, the
+    shortest part [s] of many divided steps.
     """
 
     def __init__(self, progress: Callable[[float], None], note: Callable[[str], None]):
@@ -272,7 +271,7 @@ def _advice(result: Trajectory, chosen: bool, reason: str) -> str:
         )
     overlap = describe_magnet_overlap(fields, positions, result.scene.mesh.edge_lengths)
     if overlap or not chosen:
-        return overlap or "Take shorter steps."
+        return overlap or f"Take shorter steps. {describe_attraction(result.scene)}".rstrip()
     return (
         "Take a larger tolerance, or more halvings; errors that do not fall with the step come from motors that jump, from "
         "contacts that open and close in every step, or from round-off."
@@ -284,9 +283,7 @@ def _with_strains(result: Trajectory) -> Trajectory:
     if not any(isinstance(owner, Shell) for owner, _ in result._varied):
         return result
     strain = StrainHistory.of_each(result._strains(k) for k in range(len(result)))
-    return replace(
-        result, _largest_membrane_strain=strain.membrane, _largest_bending_strain=strain.bending
-    )
+    return replace(result, _largest_membrane_strain=strain.membrane, _largest_bending_strain=strain.bending)
 
 
 def _warn(result: Trajectory) -> None:

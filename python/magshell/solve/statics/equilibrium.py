@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 # For messages: the energies of a result have no gradients, and these functions have.
 INSTEAD_OF_ENERGIES = (
-    "ms.energy and ms.energies have one, at result.positions and result.edge_rotations with the values of the solve"
+    "ms.energy and ms.energies have one, at positions and edge_rotations with the values of the solve"
 )
 
 

@@ -31,11 +31,11 @@ _ROUND_OFF = 1e-12  # of the values: differences below tell no order
 @immutable
 @dataclass(frozen=True)
 class Extrapolation:
-    """An estimate of the exact solution from nested meshes, or from steps that are halved; each attribute is of the kind that
-    `solve` returned.
+    """An estimate of the exact solution from nested meshes, or from steps that are halved; each attribute is of the
+    kind that `solve` returned.
 
-    value: extrapolated to infinitely fine meshes or short steps. Where values are by vertex, at the vertices of the coarsest mesh;
-        of six-node elements at their corners, mesh.corner_vertices.
+    value: extrapolated to infinitely fine meshes or short steps. Where values are by vertex, at the vertices of the
+        coarsest mesh; of six-node elements at their corners, mesh.corner_vertices.
     error: how far the finest mesh's own value is from it. That of `value` itself is smaller, by one or two powers of the
         mesh width where that is fine enough. Of steps, at least the difference of the last two values: an error bar.
     order: the power of the mesh width or the step with which errors fall: the one assumed, or found from three values.
@@ -74,22 +74,24 @@ def richardson_extrapolation(
 
         value = f + (f - c) / (r^p - 1),     error = |value - f|
 
-    solve: called with each mesh, or with each time step [s]; returns a number, an array, a tensor, or a dict of these, in whatever units: deflections,
-        reactions, energies, frequencies, critical fields, positions. Arrays have one shape on all meshes, or a row for
-        each vertex of the mesh: (n_v, ...). Gradients go back through tensors.
+    solve: called with each mesh, or with each time step [s]; returns a number, an array, a tensor, or a dict of
+        these, in whatever units: deflections, reactions, energies, frequencies, critical fields, positions. Arrays
+        have one shape on all meshes, or a row for each vertex of the mesh: (n_v, ...). Gradients go back through
+        tensors.
     meshes: two or three TriangleMeshes, SixNodeMeshes or TetMeshes, the coarsest first, each dividing the cells of the one
         before it alike: by mesh.refined(), or by a generator with twice its cells (never with irregular=...). refined() of
         curved elements stays on their surface, and so does the limit; a generator's meshes come nearer to the true one.
-    time_step: s, in place of meshes: `solve` is called with it, with half and with a quarter of it. It simulates a motion in
-        such steps and returns what is wanted of it, such as a way or a period.
+    time_step: s, in place of meshes: `solve` is called with it, with half and with a quarter of it. It simulates a
+        motion in such steps and returns what is wanted of it, such as a way or a period.
     order: p. By default 2 with two meshes, of six-node elements 4; with three what their values say, of an array by the
         norms of its differences: p = log(|m - c| / |f - m|) / log r.
 
     Works where errors are smooth in h: not beside cracks, reentrant corners and point supports that the mesh resolves
-    badly, nor where meshes find different equilibria. Three meshes tell. Six-node elements reach their order only where the
-    solution is smooth: under a point force it is 2 to 3, and two meshes that assume 4 then find `error` up to five times too
-    small, so take three. Of a motion the order found should be that of the integrator, and 1 where contacts open and close; the
-    error is at least the difference of the last two values, because another order may be found by chance.
+    badly, nor where meshes find different equilibria. Three meshes tell. Six-node elements reach their order only
+    where the solution is smooth: under a point force it is 2 to 3, and two meshes that assume 4 then find `error` up to
+    five times too small, so take three. Of a motion the order found should be that of the integrator, and 1 where
+    contacts open and close; the error is at least the difference of the last two values, because another order may be
+    found by chance.
 
     Raises ValueError where the meshes are not nested, or what solve returns differs in shape; NotConverged where the
     values of three meshes do not converge, with an Extrapolation in `last_good` that has the finest mesh's value and the
@@ -162,9 +164,9 @@ def _over_steps(solve: Callable[..., Any], time_step: float, order: Any) -> Extr
     for name, (*_, why) in found.items():
         if why:
             raise NotConverged(
-                f"{_the(name)} is not in the range of convergence: from a time step of {time_step:.4g} s to half and a quarter "
-                f"of it, {why}, so its error cannot be told. Take shorter steps, or ms.Adaptive with a smaller tolerance; "
-                "`error.last_good` has the values.",
+                f"{_the(name)} is not in the range of convergence: from a time step of {time_step:.4g} s to half and a "
+                f"quarter of it, {why}, so its error cannot be told. Take shorter steps, or ms.Adaptive with a smaller "
+                "tolerance; `error.last_good` has the values.",
                 result,
             )
     return result

@@ -77,8 +77,9 @@ def find_equilibria(
 
     start: an equilibrium, EquilibriumSet, positions (n_v, 3) m, or a list of these: where to look as well, for saddles too
         if they are asked for.
-    include_unstable: hand back saddles too; `n_negative_eigenvalues` tells them. Their energy over that of a well beside
-        them is what a snap has to be given at least. Deep wells have theirs far away: a `start` that looks like one finds it.
+    include_unstable: hand back saddles too; `n_negative_eigenvalues` tells them. Their energy over that of a well
+        beside them is what a snap has to be given at least. Deep wells have theirs far away: a `start` that looks
+        like one finds it.
     attempts: how many searches are made after the first. One takes from ten to, far from everything, thousands of
         factorizations; `solver` limits it.
     distinct_tolerance: m, the largest distance between two equilibria that count as one, vertex by vertex;
