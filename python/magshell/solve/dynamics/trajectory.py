@@ -148,7 +148,7 @@ class Trajectory(AnimateMixin, OfOneBody):
     end: the last state, from which another simulation continues. bytes: memory of the data stored for gradients.
 
     Where an input was a tensor that requires a gradient, energies, strains, stresses and forces are in torch's graph too,
-    and raise NoGradient if they are differentiated.
+    and raise NoGradient if they are differentiated. Copies, pickles and files hold arrays in place of all tensors.
     """
 
     scene: Scene

@@ -58,7 +58,7 @@ class Equilibrium(SaveMixin, OfOneBody):
     wall_time, linear_time: s, of the whole solve, and of factorizations and back-substitutions. memory: bytes, of the core.
 
     Where an input was a tensor that requires a gradient, energies, strains, stresses and forces are in torch's graph too,
-    and raise NoGradient if they are differentiated.
+    and raise NoGradient if they are differentiated. Copies, pickles and files hold arrays in place of all tensors.
     """
 
     scene: Scene

@@ -163,7 +163,7 @@ class _EquilibriumSearch:
                     break
 
     def sorted(self, unstable: bool) -> list[Equilibrium]:
-        return sorted((each for each in self.known if unstable or each.stable), key=lambda each: each.energy)
+        return sorted((each for each in self.known if unstable or each.stable), key=lambda each: each._energy)
 
     def _find(self, start, require_stable: bool = True) -> Equilibrium:
         search = replace(self._search, progress=self._progress(), require_stable=require_stable)
@@ -249,7 +249,7 @@ class _EquilibriumSearch:
                 return False
         self.known.append(found)
         kind = "stable" if found.stable else f"{found.n_negative_eigenvalues} unstable directions"
-        log.info("equilibria: %d found, %s, energy %.6g J", len(self.known), kind, found.energy)
+        log.info("equilibria: %d found, %s, energy %.6g J", len(self.known), kind, found._energy)
         return True
 
     def _points(self, found: Equilibrium) -> np.ndarray:
