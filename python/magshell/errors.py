@@ -39,7 +39,8 @@ class MeshQualityWarning(UserWarning):
     """A warning about a mesh whose results cannot be trusted.
 
     Either faces are nearly degenerate (see TriangleMesh.quality), or a solid has too few tetrahedra for the mean-volume
-    formulation, or midside nodes are off a curved surface.
+    formulation, or midside nodes are off a curved surface, or bodies start within the distance at which a contact begins by
+    default.
     """
 
 

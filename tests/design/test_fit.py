@@ -294,3 +294,9 @@ def test_bad_arguments_are_named(arguments, message):
 def test_bad_parameters_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         ms.FitParameter(**arguments)
+
+
+def test_a_negative_bound_of_a_logarithm_is_refused():
+    with pytest.raises(ValueError, match="lower must be 0 or more where log=True, got -1"):
+        ms.FitParameter(1.0, lower=-1.0, log=True)
+    assert ms.FitParameter(1.0, lower=0.0, log=True).log

@@ -10,10 +10,8 @@ import magshell as ms
 
 torch = pytest.importorskip("torch")
 
-from magshell.design.optim.gauss_newton import (  # noqa: E402
-    DenseModel,
-    ProductModel,
-)
+from magshell.design.optim.dense_model import DenseModel  # noqa: E402
+from magshell.design.optim.gauss_newton import ProductModel  # noqa: E402
 
 HOWS = ("forward", "backward", "products")
 
@@ -53,6 +51,34 @@ def test_bounded_step_agrees_with_scipy(rng, shape, damping):
         assert (step >= lower).all() and (step <= upper).all()
         cost = 0.5 * np.sum((matrix @ step - target) ** 2)
         assert cost <= best.cost * (1 + 1e-9) + 1e-12
+
+
+@pytest.mark.parametrize("shape", [(153, 768), (325, 1728), (400, 300)])
+def test_bounded_steps_of_many_parameters_end(monkeypatch, rng, shape):
+    """Take entries of nearly the same effect, as magnetizations of neighbouring faces; many of them end at a bound."""
+    places, entries = np.linspace(0, 1, shape[0])[:, None], np.linspace(0, 1, shape[1])
+    jacobian = np.exp(-(((places - entries) / 0.1) ** 2)) * (1 + 0.3 * rng.standard_normal(shape[1]))
+    jacobian += 1e-6 * rng.standard_normal(shape)
+    residuals, count = 30 * np.sin(9 * places[:, 0]), []
+    for module, name in ((scipy.linalg, "cho_factor"), (np.linalg, "svd")):
+        original = getattr(module, name)
+        monkeypatch.setattr(
+            module, name, lambda *a, _original=original, **b: count.append(1) or _original(*a, **b)
+        )
+    lower, upper = -np.ones(shape[1]), np.ones(shape[1])
+    for radius in (np.inf, 5.0):
+        step = DenseModel(jacobian, residuals).step(lower, upper, radius)
+        assert (
+            (step >= lower).all() and (step <= upper).all() and np.linalg.norm(step) <= radius * (1 + 1e-12)
+        )
+        assert len(count) < 100
+        count.clear()
+        if radius == np.inf:
+            # A convex function is above its tangent plane, so within the box it is lower by at most the plane's fall.
+            left = jacobian @ step + residuals
+            slope = jacobian.T @ left
+            least = (slope * np.where(slope > 0, step - lower, step - upper)).sum()
+            assert least < 1e-4 * 0.5 * (residuals @ residuals)
 
 
 def test_step_has_the_length_of_the_radius(rng):

@@ -28,6 +28,17 @@ def test_links_lead_somewhere() -> None:
     assert len(targets) > 15 and missing == []
 
 
+def test_every_page_of_the_manual_is_listed() -> None:
+    """Compare the list with the how-to pages, and with the first two parts of the table of contents."""
+    listed = set(re.findall(r"\]\(docs/([^)#]+)\.md\)", README.read_text()))
+    contents = (README.parent / "docs" / "index.md").read_text()
+    parts = re.findall(r":caption: (?:First steps|How to)\n.*?\n\n(.*?)```", contents, re.DOTALL)
+    pages = {page for part in parts for page in part.split()}
+    files = {f"how-to/{path.stem}" for path in (README.parent / "docs" / "how-to").glob("*.md")}
+    assert len(parts) == 2 and files <= pages
+    assert pages - listed == set()
+
+
 def test_readme_fits_two_screens() -> None:
     """Limit the length; further text belongs into the manual."""
     assert len(README.read_text().splitlines()) < 170

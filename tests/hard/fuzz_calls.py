@@ -303,6 +303,11 @@ def _solves(s: Sample) -> Iterator[Call]:
         ms.richardson_extrapolation,
         {"solve": lambda mesh: mesh.size, "meshes": meshes, "order": 2.0},
     )
+    yield Call(
+        "richardson_extrapolation",
+        ms.richardson_extrapolation,
+        {"solve": lambda step: 1.0 + step, "time_step": 1e-3, "order": 2.0},
+    )
     yield Call("TriangleMesh.refined", s.mesh.refined, {"surface": ms.shapes.ball(1.0)})
     options = {"start": None, "until": None, "first_step": 0.5, "max_step": 0.5, "min_parameter": -1.0}
     yield Call(

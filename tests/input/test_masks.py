@@ -63,3 +63,16 @@ def test_creases_in_a_mask_have_a_stiffness_for_each_edge():
 )
 def test_objects_on_a_mask_print_how_many_it_selects(make, count):
     assert repr(make(FACES)) == repr(make(mask(FACES, count)))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: ms.Clamp(np.zeros(MESH.n_edges, bool)),
+        lambda: ms.Pin(np.zeros(MESH.n_vertices, bool)),
+        lambda: ms.PointLoad(np.zeros(MESH.n_vertices, bool), (0, 0, 1e-3)),
+    ],
+)
+def test_a_mask_that_is_false_everywhere_is_refused_where_it_is_given(make):
+    with pytest.raises(ValueError, match="are empty: the mask is False everywhere"):
+        make()

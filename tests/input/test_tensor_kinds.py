@@ -215,3 +215,23 @@ def test_compiled_code_runs_solves_as_they_are(scene, solve):
     found.backward()
     tip(plain).backward()
     assert torch.equal(compiled.grad, plain.grad)
+
+
+def test_results_have_the_dtype_to_which_torch_promotes_the_inputs():
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+
+    def dtype(of_magnetization, of_field):
+        return ms.equilibrium(
+            scene,
+            remanent_magnetization=torch.tensor([4e4, 0, 0], dtype=of_magnetization),
+            applied_flux_density=torch.tensor([0, 0, 1e-3], dtype=of_field),
+        ).positions.dtype
+
+    for pair in (
+        (torch.float32, torch.float64),
+        (torch.float64, torch.float32),
+        (torch.float32, torch.float32),
+    ):
+        assert dtype(*pair) == torch.promote_types(*pair)

@@ -180,3 +180,27 @@ def test_some_faces_beyond_the_limits_are_not_warned_of_and_all_of_them_are(name
         there = scene(remanent_magnetization=np.zeros(3))
         solve = {"applied_flux_density": np.zeros(3), name: varied(usual, some)}
         assert not warned(lambda: ms.equilibrium(there, **solve))
+
+
+def test_a_design_that_an_optimizer_tries_is_no_mistaken_unit():
+    torch = pytest.importorskip("torch")
+    made, loaded = scene(), {"remanent_magnetization": (0, 0, 4e4), "applied_flux_density": (0, 0, 0)}
+    modulus = torch.tensor(1e5, dtype=torch.float64, requires_grad=True)
+
+    def objective(young_modulus):
+        values = {made.bodies[0]: {"young_modulus": young_modulus}}
+        positions = ms.equilibrium(made, values=values, **loaded).positions
+        return positions[:, 2].sum() + young_modulus / 1e5
+
+    optimizer = ms.optim.GaussNewton([modulus], lower=1e-3, scale=1e5, first_step=2.0)
+    assert not warned(
+        lambda: ms.minimize(
+            lambda young_modulus: objective(young_modulus).reshape(1),
+            [modulus],
+            optimizer,
+            max_iterations=3,
+            progress=False,
+        )
+    )
+    assert float(modulus) < 0.1  # it did try one
+    assert warned(lambda: ms.equilibrium(made, young_modulus=1e-2, **loaded))

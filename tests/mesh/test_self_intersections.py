@@ -262,3 +262,18 @@ def test_a_picture_says_so():
         crossing, positions=states[0].positions, width=400, style=ms.Style(backend="matplotlib")
     )
     assert "passes through itself" in [axes.get_title() for axes in picture.figure.axes]
+
+
+def crossing_sheets(**options):
+    mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))
+    turned = mesh.transformed(rotation=rotation_matrix((0, 0.5, 0)), translation=(-1e-3, 0, 5e-3))
+    sheets = [ms.Shell(each, thickness=1e-4, young_modulus=1e6) for each in (mesh, turned)]
+    supports = [ms.Pin(range(sheet.mesh.n_vertices), body=sheet) for sheet in sheets]
+    return ms.Scene(sheets, supports=supports, **options)
+
+
+def test_bodies_that_cross_are_named_with_the_contact_that_is_missing():
+    text = repr(ms.equilibrium(crossing_sheets()))
+    assert "body 0 and body 1 pass through each other" in text
+    assert "as no ms.Contact of the two keeps them apart" in text
+    assert "parts of a sheet" not in text

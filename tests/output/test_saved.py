@@ -196,6 +196,14 @@ BROKEN = {
     "shape": (lambda _, arrays: arrays.update(positions=np.zeros((1, 3))), r"positions .* shape"),
     "state": (lambda _, arrays: arrays.update(_state=arrays["_state"][:-1]), r"_state .* shape"),
     "numbers": (lambda _, arrays: arrays.update({"_values.numbers": np.zeros(1)}), r"values .* shape"),
+    "integers": (
+        lambda _, arrays: arrays.update(positions=np.zeros(arrays["positions"].shape, int)),
+        r"positions holds numbers of kind 'i'",
+    ),
+    "other positions": (
+        lambda _, arrays: arrays.update(positions=2.0 * arrays["positions"]),
+        r"positions are not those of its state",
+    ),
     "less": (lambda _, arrays: arrays.pop("edge_rotations"), r"is not a saved result"),
 }
 
@@ -207,6 +215,20 @@ def test_a_broken_file_is_refused(change, message, tmp_path):
     changed(path, change)
     with pytest.raises(ValueError, match=message):
         ms.load(path, scene)
+
+
+def test_a_broken_file_of_a_motion_is_refused(tmp_path):
+    scene, path = strip(), tmp_path / "move.npz"
+    ms.save(path, ms.simulate(scene, steps=2, time_step=1e-3, **FIELD))
+    for name, change, message in (
+        ("times", lambda array: array[::-1], "times do not rise"),
+        ("positions", lambda array: 2.0 * array, "positions are not those of its state"),
+    ):
+        before = path.read_bytes()
+        changed(path, lambda _, arrays, name=name, change=change: arrays.update({name: change(arrays[name])}))
+        with pytest.raises(ValueError, match=message):
+            ms.load(path, scene)
+        path.write_bytes(before)
 
 
 def test_load_refuses_numbers_of_open_files():

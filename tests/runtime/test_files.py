@@ -200,3 +200,14 @@ def test_the_file_beside_has_the_ending(tmp_path):
     with replacing(tmp_path / "film.mp4") as part:
         assert part.suffix == ".mp4" and part.parent == tmp_path and not (tmp_path / "film.mp4").exists()
     assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
+
+
+def test_the_next_save_removes_what_a_killed_one_left_behind(tmp_path):
+    left, others = ".rest.0123abcd.npz", [".rest.0123abcd.json", ".rests.0123abcd.npz", "rest.0123abcd.npz"]
+    for name in (left, ".rest.89abcdef.npz", *others):
+        (tmp_path / name).write_bytes(b"part")
+    os.utime(tmp_path / left, (0, 0))  # the other one may be somebody's who writes now
+    replace_file(tmp_path / "rest.npz", lambda file: file.write(b"all"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        ["rest.npz", ".rest.89abcdef.npz", *others]
+    )

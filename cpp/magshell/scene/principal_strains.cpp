@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "magshell/scene/creased_edges.h"
 #include "magshell/scene/shell_loops.h"
 #include "magshell/scene/shell_stresses.h"
 #include "magshell/terms/shell/bending_term.h"
@@ -73,6 +74,7 @@ void add_shell(const Model& model, Index body, const VectorXd& q, const VectorXd
         dynamic_cast<const BendingTerm&>(model.terms().elastic_term(body, "bending"));
     const std::vector<double> changes = angle_changes(shell, q.data());
     const auto change_of = [&](Index dihedral) { return changes[dihedral]; };
+    const CreasedEdges creases(model, shell, bending, q);
     const double* rotations = q.data() + first_scalar;
     over_blocks(shell.n_faces(), [&](Index from, Index to) {
         for (Index first = from; first < to; first += SimdDouble::width) {
@@ -84,12 +86,15 @@ void add_shell(const Model& model, Index body, const VectorXd& q, const VectorXd
                                                                        : membrane.rest_corners(f),
                                           own = bending.grows() ? bending.grown(f).corners()
                                                                 : shell.rest_corners(f);
-                const Vec3 turned = bending.natural_angle_changes(f);
+                Vec3 bends = -bending.natural_angle_changes(f);
+                for (int k = 0; k < 3; ++k)
+                    bends[k] += bending_strain(shell.sides[f][k], change_of, rotations);
+                bends = creases.strains_of_sheet(f, bends);
                 for (int k = 0; k < 3; ++k) {
                     set_lane(own_rest[k], lane, own[k]);
                     set_lane(rest[k], lane, corners[k]);
                     set_lane(x[k], lane, q.data() + 3 * membrane.corners()[f][k]);
-                    delta[k].set(lane, bending_strain(shell.sides[f][k], change_of, rotations) - turned[k]);
+                    delta[k].set(lane, bends[k]);
                 }
                 half_thickness.set(lane, 0.5 * thickness[first_row + shell.faces.user[f]]);
             }

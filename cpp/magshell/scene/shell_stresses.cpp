@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 
 #include "magshell/energy/material.h"
+#include "magshell/scene/creased_edges.h"
 #include "magshell/scene/shell_loops.h"
 #include "magshell/terms/shell/bending_term.h"
 #include "magshell/terms/shell/membrane_term.h"
@@ -67,6 +68,7 @@ std::vector<FaceStress> shell_stresses(const Model& model, Index number, const V
     const BendingTerm& bending =
         dynamic_cast<const BendingTerm&>(model.terms().elastic_term(number, "bending"));
 
+    const CreasedEdges creases(model, shell, bending, q);
     Strains stretches(shell.n_faces()), bends(shell.n_faces());
     for (Index f = 0; f < shell.n_faces(); ++f) {
         const std::array<Vec3, 3> rest = membrane.rest_corners(f);
@@ -95,9 +97,11 @@ std::vector<FaceStress> shell_stresses(const Model& model, Index number, const V
             const Measures cut = measures(stretching, membrane.rest_corners(f)),
                            own = measures(bending, shell.rest_corners(f));
             const auto of_stretch = cut.face().membrane_measures(), of_bend = own.face().bending_measures();
-            out[shell.faces.user[f]] = {
-                cut.tensor(of_stretch, three(stretches, f)), own.tensor(of_bend, three(bends, f)),
-                cut.conjugate(of_stretch, three(pulls, f)), own.conjugate(of_bend, three(moments, f))};
+            const Vec3 bent = three(bends, f), moment = creases.moments(f, bent, three(moments, f));
+            out[shell.faces.user[f]] = {cut.tensor(of_stretch, three(stretches, f)),
+                                        own.tensor(of_bend, creases.strains_of_sheet(f, bent)),
+                                        cut.conjugate(of_stretch, three(pulls, f)),
+                                        own.conjugate(of_bend, moment)};
         }
     });
     return out;

@@ -87,6 +87,8 @@ def selection(name: str, values: Any, of: str | None = None) -> np.ndarray:
     if array.ndim != 1 or not (array.dtype == bool or np.issubdtype(array.dtype, np.integer)):
         what = f"{values!r:.60}" if np.ndim(values) == 0 else f"{array.dtype} of shape {array.shape}"
         raise ValueError(f"{name} must be integer indices of shape (k,), got {what}")
+    if array.dtype == bool and not array.any():
+        raise ValueError(f"{name} are empty: the mask is False everywhere")
     own = array.copy()  # the caller may change its array later
     if isinstance(values, Indices):
         own = Indices(own, values.kind, values.total)

@@ -36,6 +36,13 @@ def numbers_of(tensor) -> np.ndarray:
     return (plain.float() if plain.dtype == sys.modules["torch"].bfloat16 else plain).numpy()
 
 
+def numbers_refusing(numbers: np.ndarray, source, why: str):
+    """Return numbers as a tensor that torch differentiates by `source`: where it does, NoGradient says why there is none."""
+    from ..solve.adjoint.autograd import numbers_refusing
+
+    return numbers_refusing(numbers, source, why)
+
+
 def why_not(values) -> str:
     """Say why the numbers of a tensor, or of a list with tensors, cannot be read, and what to do instead.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from typing import Any
 
@@ -105,9 +106,16 @@ def like(values: np.ndarray, *inputs):
 
 
 def dtype_like(*inputs):
-    """Return the dtype of results: that of the first floating-point tensor among the inputs, or float64."""
-    real = (given.dtype for given in inputs if is_tensor(given) and given.is_floating_point())
-    return next(real, sys.modules["torch"].float64)
+    """Return the dtype of results, as torch promotes those of floating-point tensors among the inputs; float64 without any.
+
+    Tensors with axes come before those without.
+    """
+    torch = sys.modules["torch"]
+    real = [given for given in inputs if is_tensor(given) and given.is_floating_point()]
+    deciding = [given for given in real if given.ndim > 0] or real
+    if not deciding:
+        return torch.float64
+    return functools.reduce(torch.promote_types, [given.dtype for given in deciding])
 
 
 def joined(parts: list[Any], axis: int = 0):

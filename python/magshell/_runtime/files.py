@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +19,9 @@ from typing import BinaryIO
 _STEM = (
     40  # characters of the name that the temporary file keeps: longer names might exceed the system's limit
 )
+
+
+_ABANDONED = 3600.0  # [s] age of a temporary file that nobody writes any more: writing takes minutes at most
 
 
 @contextmanager
@@ -87,6 +91,7 @@ def _create_temporary(target: Path) -> Path:
     part = target.with_name(f".{target.stem[:_STEM]}.{os.urandom(4).hex()}{target.suffix}")
     try:
         os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        _remove_left_behind(target, part)
     except OSError as error:
         if not target.parent.is_dir():
             reason = f"there is no folder {str(target.parent)!r}"
@@ -99,6 +104,17 @@ def _create_temporary(target: Path) -> Path:
             raise
         raise OSError(error.errno, reason) from error
     return part
+
+
+def _remove_left_behind(target: Path, part: Path) -> None:
+    """Remove temporary files of the same target that processes left behind when they were killed."""
+    named = re.compile(rf"\.{re.escape(target.stem[:_STEM])}\.[0-9a-f]{{8}}{re.escape(target.suffix)}")
+    now = part.stat().st_mtime
+    for other in target.parent.iterdir():
+        if named.fullmatch(other.name) and other != part:
+            with contextlib.suppress(OSError):
+                if now - other.stat().st_mtime > _ABANDONED:
+                    other.unlink()
 
 
 def _copy_permissions(part: Path, there: os.stat_result | None) -> None:

@@ -69,8 +69,11 @@ def check_known(function: str, named, known, groups: dict[str, type[Any]]) -> No
                     there = f"{parameter}=ms.{group.__name__}({field}=...)"
                     raise TypeError(f"{function}() has no keyword {name!r}; use {there}")
         there = [each for each in known if each != "self"]
-        use = f"{use}; it has" if (use := meant(name, there)) else "it has, most like it first"
-        raise TypeError(f"{function}() has no keyword {name!r}; {use}: {nearest_first(name, there)}")
+        has = f"it has, most like it first: {nearest_first(name, there)}"
+        if use := meant(name, there):
+            named = use.removeprefix("use ").split(" and ")
+            has = f"{use}; it has: {', '.join([*named, *(each for each in there if each not in named)])}"
+        raise TypeError(f"{function}() has no keyword {name!r}; {has}")
 
 
 # Names of quantities in other programs and textbooks, by the keyword that magshell uses.

@@ -1,4 +1,4 @@
-"""Decorators of the functions that users call: checks of keywords, Ctrl-C, torch.compile."""
+"""Decorators of the functions that users call: checks of keywords, Ctrl-C, torch's compiler and tracers."""
 
 from __future__ import annotations
 
@@ -60,14 +60,18 @@ def solve_entry(function: F) -> F:
     """Wrap a solve that users call.
 
     Ctrl-C before there is a result, also in a function of the caller's, raises Interrupted without a `last_good`.
-    Within torch.compile the solve runs uncompiled, between the graphs. Load parameters among `values` become the
-    keywords of the same names. A line "{keywords}" of its docstring is replaced by the texts of solve_keywords.py.
+    Within torch.compile the solve runs uncompiled, between the graphs. A tracer, which records operations of torch to
+    run them again, would record the numbers of this one solve as constants: ValueError refuses it. Load parameters among
+    `values` become the keywords of the same names. A line "{keywords}" of its docstring is replaced by the texts of
+    solve_keywords.py.
     """
     known = set(inspect.signature(function).parameters)
     function.__doc__ = with_keywords(function.__name__, function.__doc__)
 
     @functools.wraps(function)
     def called(*arguments, **named):
+        if tracer := _tracer():
+            raise ValueError(_TRACED.format(function.__name__, tracer))
         try:
             scene = arguments[0] if arguments else named.get("scene")
             return _untraced(function)(*arguments, **as_keywords(scene, named, known))
@@ -78,6 +82,31 @@ def solve_entry(function: F) -> F:
             raise Interrupted(f"{name}: interrupted before there was a result") from stopped
 
     return called
+
+
+_TRACED = (
+    "{0} inside {1}: a trace records operations of torch, and a solve is none of them, so its results would be constants "
+    "there. Call {0} itself; torch.compile does, and torch.func.jvp has what torch.func.linearize returns"
+)
+
+
+def _tracer() -> str:
+    """Return the name of what records the operations of torch at the moment, "" if nothing does."""
+    torch = sys.modules.get("torch")
+    if torch is None:
+        return ""
+    if torch.jit.is_tracing():
+        return "torch.jit.trace"
+    proxies = sys.modules.get("torch.fx.experimental.proxy_tensor")
+    if proxies is not None and proxies.get_proxy_mode() is not None:
+        return "make_fx (which torch.func.linearize and torch.export use)"
+    symbolic = sys.modules.get("torch.fx._symbolic_trace")
+    if symbolic is not None and getattr(symbolic, "_is_fx_tracing_flag", False):
+        return "torch.fx.symbolic_trace"
+    stack = getattr(torch._C._functorch, "peek_interpreter_stack", lambda: None)()
+    if stack is not None and stack.key().name == "Functionalize":
+        return "torch.func.functionalize"
+    return ""
 
 
 _disabled: dict[Callable[..., Any], Callable[..., Any]] = {}

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from .._input.arrays import number
 from .._input.tensors import is_tensor, require_torch
 from .._runtime.log import log
+from .._runtime.tried_designs import trying_designs
 from ..errors import DesignRejected, EquilibriumJumped
 from .configuration import as_stored, decoded, encoded
 from .jump_policies import checked_stateful, jumps_accepted, offering
@@ -144,7 +145,8 @@ class Run:
         before = self.values()
         self._answers, self.rejections, self._recorded = [], Counter(), False
         try:
-            self.optimizer.step(self.closure)
+            with trying_designs():
+                self.optimizer.step(self.closure)
             jumped = False
         except EquilibriumJumped:
             if not (self._cross and self._offering):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._input.tensors import is_tensor
+from .._input.without_gradient import without_gradient
 from .._runtime.frozen import immutable
 from ..model.results.result_lookup import result_of
 from ..model.scene.scene import Scene
@@ -68,9 +69,9 @@ class Snapshot:
         return self.motion.edge_rotations[self.index]
 
     @property
-    def energy(self) -> float:
+    def energy(self) -> Any:
         """The kinetic and potential energy, J."""
-        return float(self.motion.energy[self.index])
+        return without_gradient(float(self.motion._energy[self.index]), self.motion.positions, "state.energy")
 
     @property
     def remanent_magnetization(self) -> Any:

@@ -1,5 +1,7 @@
 """Creases of shells: folds by closed form, folds by their angle, and errors."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -126,3 +128,41 @@ def test_crease_that_pulls_at_rest_is_refused_by_linear_theory():
     with pytest.raises(ValueError, match=r"Crease\(.* pulls at the rest shape"):
         ms.linear_response(scene)
     assert ms.linear_response(scene, values={fold: {"angle": 0.0}}).displacements.shape == (85, 3)
+
+
+@pytest.mark.parametrize("bending", ["midedge", "hinge"])
+def test_a_fold_is_no_strain_of_the_faces_beside_it(bending):
+    sheet, fold, scene = strip(bending=bending, angle=0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ms.LargeStrainWarning)
+        rest = None
+        for angle in (1.0, 2.0, 2.9):
+            rest = ms.equilibrium(scene, start=rest, values={fold: {"angle": angle}})
+    assert abs(tip_rotation(rest)) == pytest.approx(2.9, rel=1e-3)
+    assert "BEYOND THE MODEL" not in repr(rest)
+    assert rest.largest_bending_strain == rest.strains().largest.max() < 1e-5
+    stresses = rest.stresses()
+    stiffness = 1e9 * 1e-3**3 / (12 * (1 - 0.3**2))
+    assert np.abs(stresses.curvatures).max() < 1e-5 * 2 / 1e-3
+    assert np.abs(stresses.bending_moments).max() < 1e-5 * 2 / 1e-3 * stiffness
+    beside = np.unique(sheet.mesh.edge_faces[fold.edges])
+    assert np.abs(stresses.von_mises_stresses[beside]).max() < 1e-5 * 1e9
+
+
+def test_a_moment_through_a_crease_bends_the_faces_beside_it_like_the_others():
+    """Check that a couple at the end bends the sheet to one curvature M/D, and folds the crease by M/k."""
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(16, 4))
+    moment, stiffness = 2e-3, 1e7 * 1e-3**3 / 12  # N, N m
+    fold = ms.Crease(mesh.edges_at(x=0.02), stiffness=moment / 0.7)
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e7, poisson_ratio=0.0, creases=[fold])
+    couple = ms.EdgeCouple(mesh.edges_at(x=0.04), moment)
+    rest = ms.equilibrium(ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[couple]))
+    exact = moment / stiffness
+    curvatures = np.abs(np.linalg.eigvalsh(rest.stresses().curvatures)).max(axis=1)
+    strains = rest.strains().largest
+    moments = np.abs(np.linalg.eigvalsh(rest.stresses().bending_moments)).max(axis=1)
+    beside = np.isin(np.arange(mesh.n_faces), mesh.edge_faces[fold.edges])
+    for faces, tolerance in ((~beside, 0.01), (beside, 0.07)):
+        np.testing.assert_allclose(curvatures[faces], exact, rtol=tolerance)
+        np.testing.assert_allclose(strains[faces], 0.5e-3 * exact, rtol=tolerance)
+        np.testing.assert_allclose(moments[faces], moment, rtol=tolerance)

@@ -183,3 +183,42 @@ def test_minimize_warns_once_that_objectives_may_jump() -> None:
         ms.minimize(objective, [factor], ms.optim.LBFGS([factor]), max_iterations=3, progress=False)
     jumps = [each for each in caught if "the objective may jump here" in str(each.message)]
     assert len(jumps) == 1 and jumps[0].category is ms.StepErrorWarning
+
+
+def test_divided_steps_are_told_during_the_motion(monkeypatch):
+    """Let a field jump in every step, with too few iterations for it, so that each step is taken in parts."""
+    from magshell._runtime.progress import SolveBar
+
+    notes = []
+    monkeypatch.setattr(SolveBar, "note", lambda bar, text: notes.append(text))
+    mesh = ms.meshes.rectangle(0.05, 0.01, cells=(20, 4))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+    jumps = np.zeros((120, 3))
+    jumps[::2, 2] = 0.08
+    move = ms.simulate(
+        scene,
+        steps=len(jumps),
+        time_step=5e-3,
+        remanent_magnetization=(4e4, 0, 0),
+        applied_flux_density=jumps,
+        stiffness_damping=1e-4,
+        solver=ms.Newton(max_iterations=4),
+    )
+    assert len(move.substeps) > 40
+    [note] = notes  # once
+    told = float(note.removesuffix(" s would do").rpartition("steps of ")[2])
+    assert note.startswith("ten steps were too long and divided") and any(
+        told == pytest.approx(5e-3 / 2.0**k, rel=0.05) for k in range(1, 7)
+    )
+
+
+def test_a_note_of_divided_steps_comes_once():
+    from magshell.solve.dynamics.single_motion import Watch
+
+    fractions, notes = [], []
+    watch = Watch(fractions.append, notes.append)
+    for fraction, shortest in ((0.1, 0.0), (0.2, 1e-3), (0.3, 5e-4)):
+        watch(fraction, shortest)
+    assert fractions == [0.1, 0.2, 0.3]
+    assert notes == ["ten steps were too long and divided: steps of 0.001 s would do"]

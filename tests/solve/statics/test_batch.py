@@ -181,7 +181,7 @@ def test_a_member_that_fails_loses_no_other():
     batch = ms.equilibrium(scene, batch=3, applied_flux_density=fields, **given)
     assert list(batch.failed) == [1] and isinstance(batch.failed[1], ms.NotConverged)
     assert batch.converged.tolist() == [True, False, True] == batch.stable.tolist()
-    assert torch.isnan(batch.positions[1]).all() and np.isnan(batch.energy[1])
+    assert torch.isnan(batch.positions[1]).all() and torch.isnan(batch.energy[1])
     with pytest.raises(ms.NotConverged):
         batch[1]
     with pytest.raises(ValueError, match=r"members \[1\] failed"):
@@ -352,3 +352,20 @@ def test_second_derivatives_inside_vmap_are_refused():
     fields = torch.tensor([[0.0, 0.0, 1e-4], [0.0, 0.0, 2e-4]], dtype=torch.float64)
     with pytest.raises(ms.NoGradient, match="no second derivatives"):
         torch.func.vmap(torch.func.grad(lambda field: torch.func.grad(height)(field).sum()))(fields)
+
+
+def test_nested_maps_are_refused_by_name():
+    torch = pytest.importorskip("torch")
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
+
+    def tip(flux_density):
+        return ms.equilibrium(
+            scene, remanent_magnetization=(4e4, 0, 0), applied_flux_density=flux_density
+        ).positions[-1, 2]
+
+    fields = torch.zeros(2, 2, 3, dtype=torch.float64)
+    with pytest.raises(ValueError, match=r"torch\.vmap inside of torch\.vmap: reshape both axes to one"):
+        torch.func.vmap(torch.func.vmap(tip))(fields)
+    assert torch.func.vmap(tip)(fields.reshape(4, 3)).shape == (4,)

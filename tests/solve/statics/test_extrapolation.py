@@ -290,3 +290,49 @@ def test_refined_onto_a_surface():
     ).value == pytest.approx(2.0 * np.pi, rel=1e-3)
     with pytest.raises(ValueError, match="surface must be a signed distance"):
         tube.refined(surface=1.0)
+
+
+def swing(time_step):
+    """Return the tip of a strip that falls from rest, at 0.08 s."""
+    mesh = ms.meshes.rectangle(0.1, 0.02, cells=(6, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    move = ms.simulate(scene, steps=round(0.08 / time_step), time_step=time_step, progress=False)
+    return move.positions[-1, -1, 2]
+
+
+def test_steps_of_a_motion_have_the_order_of_the_integrator_and_an_error_bar():
+    found = ms.richardson_extrapolation(swing, time_step=4e-3)
+    assert found.values == tuple(swing(each) for each in (4e-3, 2e-3, 1e-3))
+    assert found.order == pytest.approx(2.0, abs=0.1)  # TR-BDF2
+    exact = swing(1e-3 / 16)
+    assert abs(found.value - exact) < abs(found.values[-1] - exact) < found.error
+    assert found.error >= abs(found.values[-1] - found.values[-2])
+    assert "3 time steps" in repr(found) and "the shortest step is off by" in repr(found)
+
+
+def test_steps_out_of_the_range_of_convergence_are_told():
+    outputs = {4e-3: 1.0, 2e-3: 1.1, 1e-3: 0.9}  # as of a sheet whose landing depends on the step
+    with pytest.raises(
+        ms.NotConverged, match=r"not in the range of convergence: from a time step of 0\.004 s"
+    ) as told:
+        ms.richardson_extrapolation(outputs.__getitem__, time_step=4e-3)
+    assert told.value.last_good.value == 0.9 and told.value.last_good.error == pytest.approx(0.2)
+
+
+def test_steps_take_dictionaries_arrays_and_tensors():
+    torch = pytest.importorskip("torch")
+
+    def outputs(step):
+        return {"way": 1.0 + step, "shape": np.array([step, 2.0]), "time": torch.tensor(3.0 - step**2)}
+
+    found = ms.richardson_extrapolation(outputs, time_step=0.4)
+    assert found.order["way"] == pytest.approx(1.0) and found.value["way"] == pytest.approx(1.0)
+    assert found.order["shape"] == pytest.approx(1.0)
+    assert float(found.value["time"]) == pytest.approx(3.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("given", [{}, {"meshes": [1, 2], "time_step": 1e-3}, {"time_step": -1.0}])
+def test_either_meshes_or_a_time_step_are_given(given):
+    with pytest.raises(ValueError, match=r"meshes or a time_step|time_step .* must be positive"):
+        ms.richardson_extrapolation(swing, **given)

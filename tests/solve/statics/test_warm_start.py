@@ -1,6 +1,8 @@
 """Tests of WarmStart: designs one after another from the last equilibrium, detected jumps, gradients, equal bits."""
 
+import copy
 import io
+import pickle
 
 import numpy as np
 import pytest
@@ -248,3 +250,21 @@ def test_values_of_everything_in_a_scene_go_through_a_state(tmp_path):
     nearby = {**values, contact: {"contact_stiffness": 31.0, "offset": 1e-4}}
     found = [each(remanent_magnetization=(1e4, 0, 0), values=nearby) for each in (one, other)]
     assert np.array_equal(found[0].positions, found[1].positions)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda warm: pickle.loads(pickle.dumps(warm))])
+@pytest.mark.parametrize("batch", [None, 2])
+def test_a_copy_of_a_used_one_goes_on_with_the_same_bits(copied, batch):
+    pytest.importorskip("torch")
+    sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=ms.UniformField())
+    warm = ms.WarmStart(scene, batch=batch)
+    for used in (False, True):
+        if used:
+            warm(**design(1e-4))
+        there = copied(warm)
+        assert there.solves == warm.solves
+        one, other = (
+            each(**(design(1.1e-4) | {"applied_flux_density": (0, 0, 1.1e-4)})) for each in (warm, there)
+        )
+        np.testing.assert_array_equal(one.positions, other.positions)

@@ -1,6 +1,7 @@
 #include "magshell/linalg/krylov/operator_factor.h"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "magshell/core/errors.h"
@@ -109,6 +110,11 @@ void OperatorFactor::solve_approximately(VectorXd& rhs, double tolerance) const 
     };
     const GmresReport report = gmres(product, precondition, rhs, {tolerance, most_iterations});
     if (!report.converged && !(report.residual <= std::max(tolerance, acceptable))) {
+        if (!std::isfinite(report.residual))
+            throw InvalidInput(
+                "the forces of the own field are not finite: bodies touch or pass through each other. "
+                "Nothing but a "
+                "contact keeps bodies apart that attract each other");
         std::ostringstream message;
         message << "a linear solve with the own field did not converge: its relative residual is "
                 << report.residual << " after " << report.iterations << " iterations";

@@ -399,6 +399,35 @@ Index next_checkpoint(Index steps, Index leaf, Index slots) {
     return std::clamp<Index>(static_cast<Index>(before), 1, steps - 1);
 }
 
+namespace {
+
+// The length [s] of the shortest part of the given steps that were divided so far, 0 if these are few.
+class ShortestPart {
+  public:
+    ShortestPart(const MotionInput& input, const MotionResult& result) : input_(input), result_(result) {}
+
+    double now() {
+        constexpr std::size_t many = 10;  // see test_divided_steps_are_told_during_the_motion
+        if (input_.adaptive.intervals > 0) return 0.0;
+        for (; counted_ < result_.divided.size(); ++counted_) {
+            const Index step = result_.divided[counted_];
+            const auto found = result_.substeps.find(step);
+            if (found == result_.substeps.end()) continue;
+            for (const Substep& part : found->second)
+                shortest_ = std::min(shortest_, part.fraction() * input_.time_steps[step]);
+        }
+        return counted_ >= many && std::isfinite(shortest_) ? shortest_ : 0.0;
+    }
+
+  private:
+    const MotionInput& input_;
+    const MotionResult& result_;
+    std::size_t counted_ = 0;
+    double shortest_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
 MotionResult simulate(Model& model, const MotionInput& input, const AdjointStorageOptions& keep,
                       const MotionWatch& watch, MotionFollower* follower) {
     MotionResult result;
@@ -406,8 +435,9 @@ MotionResult simulate(Model& model, const MotionInput& input, const AdjointStora
     model.contacts().forget();
     const ScopedTimeVarying varying(model.parameters(), input.varying);
     const ScopedWatch while_watching(model, input.watched);
-    Newton newton(model, input.newton, [&](double residual) {
-        if (watch) watch(result.fraction_done, residual);
+    ShortestPart shortest(input, result);
+    Newton newton(model, input.newton, [&](double) {
+        if (watch) watch(result.fraction_done, shortest.now());
     });
     MotionInput grown;
     const bool chooses = input.adaptive.intervals > 0;

@@ -105,8 +105,9 @@ struct MotionResult {
     std::size_t bytes = 0;  // of what is stored for the adjoint
 };
 
-/// Called once per iteration; throws Interrupted to stop the motion.
-using MotionWatch = std::function<void(double progress, double residual)>;
+/// Called once per iteration; throws Interrupted to stop the motion. shortest_part: of the steps that were divided so far [s], once these
+/// are many, else 0.
+using MotionWatch = std::function<void(double progress, double shortest_part)>;
 
 /// Follows a motion step by step while the factorizations of its stages are at hand; the model is the motion's.
 class MotionFollower {

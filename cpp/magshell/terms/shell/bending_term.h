@@ -48,6 +48,9 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
         return {shell_.rest_corners(face), growth_.growth(face), growth_.curvature(face)};
     }
     Vec3 natural_angle_changes(Index face) const;
+    /// Returns the stiffness of the bending strains of a face with a curvature scale of 1 [N m], and its curvature scales.
+    Mat3 unscaled_stiffness(Index face) const { return rest_face(face).bending_stiffness(materials_[face]); }
+    Vec3 scales_of(Index face) const;
 
   private:
     friend class StrainScaffold<BendingTerm>;
@@ -87,7 +90,6 @@ class BendingTerm final : public StrainScaffold<BendingTerm>, public RestShapeTe
     double moment(const DihedralStencil& fold, const Strains& stress) const;
     void store_dihedrals(const double* q);
     void store_rates(const double* p);
-    Vec3 scales_of(Index face) const;
     RestFace rest_face(Index face) const;
     Vec3 rest_angles(Index face) const;
     /// Averages a number per face and edge as the two adjacent faces share it. The operation is its own

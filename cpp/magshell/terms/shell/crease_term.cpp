@@ -73,6 +73,16 @@ double CreaseTerm::unwrapped_angle(const double* q, std::size_t k) const {
     return before + std::remainder(fold_at(edges_[k].nodes, q).angle()[0] - before, 2.0 * std::numbers::pi);
 }
 
+std::vector<CreaseTerm::Moment> CreaseTerm::moments(const double* q) const {
+    std::vector<Moment> found;
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+        const Edge& edge = edges_[k];
+        found.push_back(
+            {edge.nodes[0], edge.nodes[1], edge.stiffness * (unwrapped_angle(q, k) - edge.rest_angle)});
+    }
+    return found;
+}
+
 double CreaseTerm::energy(const double* q, const LoadParameters&) const {
     double sum = 0.0;
     for (std::size_t k = 0; k < edges_.size(); ++k) {

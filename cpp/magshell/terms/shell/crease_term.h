@@ -47,6 +47,12 @@ class CreaseTerm final : public Term, public RestShapeTerm, public StressRateTer
         unwrapped_angles_ = angle_branches;
     }
     bool add_projective_stiffness(NodeMatrix&) const override { return false; }
+    /// The moment k L (theta - theta_r) [N m] of an edge, between two nodes.
+    struct Moment {
+        Index start, end;
+        double moment;
+    };
+    std::vector<Moment> moments(const double* q) const;
     std::size_t bytes() const override {
         return bytes_of(edges_) + bytes_of(unwrapped_angles_) + bytes_of(state_);
     }

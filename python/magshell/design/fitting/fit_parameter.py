@@ -21,7 +21,7 @@ class FitParameter(Frozen):
     start: where the search begins, of any shape; the model receives a tensor of that shape.
     lower, upper: bounds, numbers or arrays of its shape.
     log: fit its natural logarithm. It is then positive, its interval is one of factors, and its order of magnitude may be
-        parameter. Take it for moduli, thicknesses and strengths.
+        unknown. Take it for moduli, thicknesses and strengths.
     size: a large change of it, in its own unit, of its logarithm where `log`; by default upper - lower where both are
         finite, else |start|, and 1 where `log`.
     prior: (mean, standard deviation) of what is known without the data, a normal distribution; where `log`, (median,
@@ -57,6 +57,8 @@ class FitParameter(Frozen):
             raise ValueError(f"start must be within the bounds, got {_first(self.start)}")
         if self.log and not (self.start > 0).all():
             raise ValueError(f"start must be positive where log=True, got {_first(self.start)}")
+        if self.log and (np.isfinite(self.lower) & (self.lower < 0)).any():
+            raise ValueError(f"lower must be 0 or more where log=True, got {_first(self.lower)}")
         self.size: np.ndarray = self._size(size)
         self.prior: tuple[np.ndarray, np.ndarray] | None = None if prior is None else self._prior(prior)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from ..._runtime.tried_designs import trying_designs
 from .sample import Sample, Trial
 
 _SAMPLE = "sample_"
@@ -70,7 +71,8 @@ class Iterate:
     def _trial(self, x: np.ndarray) -> tuple[np.ndarray, Trial]:
         """Return the design x as the parameters store it, and the closure's values there."""
         x = self._write(x)
-        return x, self.trial_of(self._closure)
+        with trying_designs():
+            return x, self.trial_of(self._closure)
 
     def trial_of(self, closure: Callable[..., Any]) -> Any:
         """Return the values of a closure at the current parameters."""

@@ -67,8 +67,10 @@ class ResidualTrial:
     @property
     def takes_products(self) -> bool:
         """Return whether the Jacobian is not computed as a matrix."""
-        smaller = min(self.values.size, sum(parameter.numel() for parameter in self._parameters))
-        return self._how == "products" or (self._how == "auto" and smaller > MOST_BACK_SUBSTITUTIONS)
+        count = sum(parameter.numel() for parameter in self._parameters)
+        smaller, larger = sorted((self.values.size, count))
+        costly = smaller > MOST_BACK_SUBSTITUTIONS or smaller**2 * larger > MOST_OPERATIONS
+        return self._how == "products" or (self._how == "auto" and costly)
 
     def times(self, step: np.ndarray) -> np.ndarray:
         """Return the Jacobian times a step of all parameters, (m,)."""
@@ -145,6 +147,10 @@ class ResidualTrial:
 # Back-substitutions up to which a Jacobian is computed as a matrix. Conjugate gradients take about a hundred a step, each of
 # which costs two. Tested by test_many_residuals_of_many_parameters_take_products.
 MOST_BACK_SUBSTITUTIONS = 2000
+
+# Multiplications of one factorization of a Jacobian (m, n), min(m, n)^2 max(m, n), up to which it is computed as a matrix: a
+# step within bounds takes twenty to fifty. Tested by the same.
+MOST_OPERATIONS = 2e9
 
 # Cost of a column of a Jacobian over that of a row (1): a tangent of an equilibrium takes more evaluations than a gradient.
 # Tested by test_few_parameters_of_many_residuals_take_columns.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +14,13 @@ if TYPE_CHECKING:
 AFFORDABLE_FACES = 20_000
 
 
-def describe_self_intersections(mesh: TriangleMesh, states: np.ndarray) -> str:
+def describe_self_intersections(
+    mesh: TriangleMesh, states: np.ndarray, why: Callable[[np.ndarray], str] | None = None
+) -> str:
     """Describe whether a shell passes through itself in its states, (n, n_v, 3) m.
 
-    To stay fast, only the last state of a long motion is checked, and no state of a large mesh; the text says so.
+    why: says at the positions (n_v, 3) m of the first state that does what does not keep it from doing so. To stay
+    fast, only the last state of a long motion is checked, and no state of a large mesh; the text says so.
     """
     count = len(states)
     if not count or mesh.n_faces > AFFORDABLE_FACES:
@@ -36,4 +40,5 @@ def describe_self_intersections(mesh: TriangleMesh, states: np.ndarray) -> str:
     )
     faces = f"{pairs[crossing[0]]} pairs of faces"
     faces += f", first in state {crossing[0]}" if len(crossing) > 1 else ""
-    return f"PASSES THROUGH ITSELF{at} ({faces}), as nothing keeps parts of a sheet apart"
+    reason = "as nothing keeps parts of a sheet apart" if why is None else why(states[crossing[0]])
+    return f"PASSES THROUGH ITSELF{at} ({faces}), {reason}"

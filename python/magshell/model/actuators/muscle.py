@@ -12,6 +12,7 @@ from ... import _core
 from ..._input.quantity import quantity, real_numbers, shape_of
 from ..._input.scalars import positive
 from ..._input.tensors import detached
+from ..._input.without_gradient import without_gradient
 from ..._runtime.frozen import Frozen, immutable, variant
 from ..shells.quadrature_point_data import mean
 from ..solids.fibres import checked_directions, checked_weights, fibres_of
@@ -19,7 +20,7 @@ from ..solids.solid import Solid
 from .actuator import Actuator
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Numbers, SolveResult
+    from ..._input.kinds import Computed, Numbers, SolveResult
     from ..scene.scene import Scene
     from ..solids.fibres import Fibres
 
@@ -355,7 +356,7 @@ def muscles_of(result: SolveResult, body: Solid, index: int) -> dict[str, np.nda
     weights, *sums = np.zeros((4, body.mesh.n_tetrahedra))
     for muscle in muscles:
         found = MuscleResult(result, muscle)
-        states = found.states(index)
+        states = found._states(index)
         own = result._values_at(index).current(muscle).weights
         weights[muscle.elements] += own
         sums[0][muscle.elements] += own * found.activation(index)
@@ -387,6 +388,9 @@ class MuscleResult(Frozen):
 
     def states(self, index: int = -1) -> FibreStates:
         """Return the states of its fibres; of a motion or a path in a recorded state, by default the last."""
+        return without_gradient(self._states(index), self._result.positions, "states()")
+
+    def _states(self, index: int = -1) -> FibreStates:
         result = self._result
         scene, values = result.scene, result._values_at(index)
         number = next(k for k, each in enumerate(muscles_in(scene)) if each is self.muscle)
@@ -406,18 +410,18 @@ class MuscleResult(Frozen):
         ]
 
     @property
-    def stretches(self) -> np.ndarray:
+    def stretches(self) -> Computed:
         """The mean stretch of each tetrahedron with fibres in the last state, (k,)."""
         states = self.states()
         return states.mean(states.stretches)
 
     @property
-    def tensions(self) -> np.ndarray:
+    def tensions(self) -> Computed:
         """The mean tension of each tetrahedron with fibres in the last state, (k,) Pa."""
         states = self.states()
         return states.mean(states.tensions)
 
-    def force(self, index: int = -1) -> float:
+    def force(self, index: int = -1) -> Computed:
         """Return the mean force along the muscle, N: the integral of the tension over its rest volume, divided by its
         length.
         """
@@ -426,10 +430,10 @@ class MuscleResult(Frozen):
                 "the force needs the length of the fibres: Fibres(..., length=...), which ms.fibres_along knows"
             )
         states = self.states(index)
-        return float((states.tensions * states.volumes).sum() / self.muscle.length)
+        return (states.tensions * states.volumes).sum() / self.muscle.length
 
     def __repr__(self) -> str:
-        states = self.states()
+        states = self._states()
         low, high = states.stretches.min(), states.stretches.max()
         return (
             f"{self.muscle!r}: fibre stretch {low:.4g} to {high:.4g}, tension {states.tensions.min():.4g} to "

@@ -47,7 +47,8 @@ class BodyContact(Owner):
         sheet, since sheets are represented by their middle surfaces; zero for solids.
     activation_distance: the distance, m, beyond the minimal one, at which contact forces begin. By default a tenth of the
         thickness of a sheet, or a twentieth of the mean edge on the surface of a solid, and the smaller one of the two
-        bodies. A lightly pressed body rests at nearly this distance.
+        bodies. A lightly pressed body rests at nearly this distance. Bodies that start within it push each other before they
+        touch, which MeshQualityWarning tells where the distance is the default: give a smaller one than their gap.
     contact_stiffness: Pa, the contact pressure at about half the activation distance; by default the smaller Young's
         modulus of the two bodies. Forces do not depend on the time step.
     law: "barrier", whose force grows without bound, so that the minimal distance is kept under any load; or "penalty",
@@ -148,6 +149,7 @@ class BodyContact(Owner):
 
         self._distance_given: bool = given["min_distance"] is not None
         self.min_distance: float = number("min_distance", "m", self._distance(bodies), not_negative)
+        self._reach_given: bool = given["activation_distance"] is not None
         self.activation_distance: float = number("activation_distance", "m", self._reach(bodies))
         stiffness = min(map(_modulus, bodies))
         if stiffness == np.inf and given["contact_stiffness"] is None:

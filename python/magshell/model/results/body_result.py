@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._input.without_gradient import without_gradient
 from ..._runtime.frozen import Frozen
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..shells.shell import Shell
@@ -63,9 +64,11 @@ class BodyResult(Frozen):
         Of a QuadraticTriangleMesh they are at the midpoints of its flat faces, four per element. index: a recorded
         state of a motion or a path, by default the last.
         """
-        arguments = () if np.ndim(self._result.positions) == 2 else (index,)
+        return without_gradient(self._strains(index), self._result.positions, "strains()")
+
+    def _strains(self, index: int = -1) -> Strains:
         rows = slice(self._first_row, self._first_row + self.mesh.n_faces)
-        return Strains(*(each[rows] for each in self._result.strains(*arguments)))
+        return Strains(*(each[rows] for each in self._result._strains(index)))
 
     def stresses(self, index: int = -1) -> ShellStresses:
         """Return membrane forces and bending moments of its faces with their strains and curvatures, and the stresses at the
@@ -82,6 +85,9 @@ class BodyResult(Frozen):
         >>> abs(stresses.principal_membrane_forces[0]).round(3)  # Y h times a Green strain of 1.005 %, nothing across
         array([10.05,  0.  ])
         """
+        return without_gradient(self._stresses(index), self._result.positions, "stresses()")
+
+    def _stresses(self, index: int = -1) -> ShellStresses:
         return stresses_of(self._result._values_at(index), self.body, self._result._state_at(index))
 
     @property

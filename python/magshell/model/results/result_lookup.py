@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.without_gradient import without_gradient
 from ..actuators.muscle import Muscle, MuscleResult
 from ..rigid.joints import Joint
 from ..rigid.rigid import RigidBody, RigidBodyResult
@@ -43,7 +44,9 @@ def displacements_of(result: Any) -> Any:
     if given is not None and not isinstance(result.positions, np.ndarray):
         return result.positions - given.to(result.positions)
     if isinstance(result.positions, np.ndarray):
-        return result.positions - rest
+        moved = result.positions - rest
+        moved.setflags(write=False)  # as the other arrays of a result
+        return moved
     return result.positions - result.positions.new_tensor(np.array(rest))
 
 
@@ -66,10 +69,13 @@ class OfOneBody:
         >>> abs(shape.stresses().principal_membrane_forces[0]).round(3)
         array([10.05,  0.  ])
         """
+        return without_gradient(self._stresses(index), getattr(self, "positions", None), "result.stresses()")
+
+    def _stresses(self, index: int = -1) -> Any:
         bodies = self.scene.bodies
         if len(bodies) != 1:
             raise ValueError(f"the scene has {len(bodies)} bodies: say which, result[body].stresses()")
-        return result_of(self, bodies[0]).stresses(index)
+        return result_of(self, bodies[0])._stresses(index)
 
     def _one_solid(self) -> SolidResult | None:
         """Return the result of the only solid, which `strains` needs if the scene has no sheets; else None."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._input.tensors import detached
+from ..._input.without_gradient import without_gradient
 from ..actuators.muscle import muscles_of
 from ..solids.solid_stresses import SolidStates, states_at
 from .body_result import BodyResult
@@ -36,6 +37,9 @@ class SolidResult(BodyResult):
         >>> strains.mean(strains.volume_ratios)[0].round(6), strains.mean(strains.green_strains)[0, 0, 0].round(6)
         (np.float64(1.1), np.float64(0.105))
         """
+        return without_gradient(self._states(index), self._result.positions, "strains()")
+
+    def _states(self, index: int = -1) -> SolidStates:
         positions = np.asarray(detached(self._result.positions), dtype=np.float64)
         at = positions if positions.ndim == 2 else positions[index]
         found = states_at(self._result._values_at(index), self.body, at)
@@ -47,6 +51,9 @@ class SolidResult(BodyResult):
         `green_strains`, `cauchy_stresses`, `von_mises_stresses` and `mean` have the same names in a shell's `stresses`.
         """
         return self.strains(index)
+
+    def _stresses(self, index: int = -1) -> SolidStates:
+        return self._states(index)
 
 
 def describe_strains(result: SolveResult, of_sheets: str) -> str:
@@ -63,7 +70,7 @@ def describe_strains(result: SolveResult, of_sheets: str) -> str:
         ):
             lines.append(f"{name}: strain and stress: ask result[solid].strains()")
             continue
-        strains = SolidResult(result, solid).strains()
+        strains = SolidResult(result, solid)._states()
         ratios, stress = strains.volume_ratios, strains.von_mises_stresses
         lines.append(
             f"{name}: J {ratios.min():.4g} to {ratios.max():.4g}, largest principal Green strain "

@@ -1,8 +1,9 @@
 """Checks a scene when it is made, and warns of what is likely a mistake: above all sizes and material values that no soft
 body has, most often a mistaken unit; once per scene and kind of value.
 
-A mistaken unit is in every entry. If some faces are within the limits and others beyond, as a fit of a modulus face by face
-tries on its way, or a design that thins faces out to nothing, no unit is mistaken, and no warning is issued.
+Nobody mistook a unit in a design that an optimizer tries. A mistaken unit is in every entry. If some faces are within
+the limits and others beyond, as a fit of a modulus face by face tries on its way, or a design that thins faces out to
+nothing, no unit is mistaken, and no warning is issued.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._runtime.tried_designs import is_tried_design
 from ..._runtime.warning_stacklevel import callers_level
-from ...errors import SusceptibilityWarning, UnitWarning
+from ...errors import MeshQualityWarning, SusceptibilityWarning, UnitWarning
 from ..contact.contacts_to_core import check_neighbours
 from ..loads.custom_energy import CustomEnergy
 from ..shells.shell import Shell
 from ..solids.mean_volume import warn_of_thin_regions
 from ..solids.solid import Solid
+from .contact_state import compute_contact_state
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -181,7 +184,7 @@ def _warn_of_most(scene: Scene, name: str, unit: str, rows: np.ndarray, most: fl
 
 
 def _warn(scene: Scene, kind: str, what: str, hint: str) -> None:
-    if kind in scene._warned_of_units:
+    if kind in scene._warned_of_units or is_tried_design():
         return
     scene._warned_of_units.add(kind)
     warnings.warn(f"{what}: {hint} Units are SI", UnitWarning, stacklevel=callers_level())
@@ -195,9 +198,32 @@ def check_new_scene(scene: Scene) -> None:
     _check_names(scene)
     check_neighbours(scene, warns=True)
     warn_of_units(scene, scene._values)
+    _warn_of_early_contact(scene)
     for span, body in zip(scene._bodies.spans, scene.bodies, strict=True):
         if isinstance(body, Solid) and body.mean_volume:
             warn_of_thin_regions(body.mesh, _held_vertices(scene)[span.vertices])
+
+
+def _warn_of_early_contact(scene: Scene) -> None:
+    """Warn of bodies that start within the distance at which their contact begins by default."""
+    state = scene._model.rest_state()
+    for contact in scene._body_contacts:
+        if contact._reach_given or len(contact._sides) < 2 or scene._model.refusal(state):
+            continue
+        found = compute_contact_state(scene, scene._values, contact, state)
+        if not len(found.pairs):
+            continue
+        gap = float(found.smallest_distance) - contact.min_distance
+        names = " and ".join(
+            f"body {scene._bodies.number(side)}" for side in contact._sides if side in scene.bodies
+        )
+        warnings.warn(
+            f"{names or 'bodies'} start {gap:.3g} m apart, within the {contact.activation_distance:.3g} m at which their "
+            f"contact begins by default, and push each other with {found.normal_force:.3g} N before they touch. Moved by "
+            "supports they push too hard. Contact(..., activation_distance=...) of less than this gap does not.",
+            MeshQualityWarning,
+            stacklevel=callers_level(),
+        )
 
 
 def _check_names(scene: Scene) -> None:

@@ -136,8 +136,7 @@ class Shell(Owner):
     poisson_ratio: in (-1, 1/2].
     mass_density: kg/m3, positive; needed for gravity and motions only.
     curvature_scale: positive factor on every bending strain, [Chen22] k_cur; not for "midedge2".
-    creases: Crease objects, fold lines with a stiffness of their own. They set the
-        curvature_scale of their edges.
+    creases: Crease objects, fold lines with a stiffness of their own. They set the curvature_scale of their edges.
     bending: "midedge", the default (second order, on irregular meshes too, see `quality`; one rotation per edge: the
         lowest-order Hellan-Herrmann-Johnson element); "midedge2", the default and the only one for a
         QuadraticTriangleMesh (fourth order in smooth problems; curved elements, two rotations per edge, linear moments, and
@@ -169,13 +168,12 @@ class Shell(Owner):
     growth and rest_curvature may change along ms.follow_path and in ms.simulate. With "hinge" both faces of an edge share
     one angle, their mean, and free edges have none.
 
-    Choice of the element: an element of "midedge2" costs about eight times as much as a face of "midedge", but far fewer are
-    needed. For
-    deflections and loads to a percent or better, and for sheets that twist or are curved at rest, use "midedge2" with a
-    QuadraticTriangleMesh; often the coarsest mesh that represents the shape is enough. If the mesh has to be fine anyway,
-    for contacts, many small faces with their own magnetization, creases or folds, or if a few percent are enough, use
-    "midedge". The fourth order needs smooth solutions: at corners of clamps, at point forces and at jumps inside an
-    element both converge equally fast.
+    Choice of the element: an element of "midedge2" costs about eight times as much as a face of "midedge", but far
+    fewer are needed. For deflections and loads to a percent or better, and for sheets that twist or are curved at
+    rest, use "midedge2" with a QuadraticTriangleMesh; often the coarsest mesh that represents the shape is enough. If
+    the mesh has to be fine anyway, for contacts, many small faces with their own magnetization, creases or folds, or
+    if a few percent are enough, use "midedge". The fourth order needs smooth solutions: at corners of clamps, at
+    point forces and at jumps inside an element both converge equally fast.
 
     >>> import magshell as ms
     >>> ms.Shell(ms.meshes.rectangle(0.1, 0.02, cells=(10, 2)), thickness=1e-3, young_modulus=1e5)

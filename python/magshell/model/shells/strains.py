@@ -39,7 +39,9 @@ class Strains(NamedTuple):
     @property
     def largest(self) -> np.ndarray:
         """The largest magnitude among the four strains of each face, (n_f,)."""
-        return np.abs(np.concatenate(self, axis=1)).max(axis=1)
+        largest = np.abs(np.concatenate(self, axis=1)).max(axis=1)
+        largest.setflags(write=False)  # as the others
+        return largest
 
 
 class Largest(NamedTuple):
@@ -115,7 +117,7 @@ def warn_if_large(result: SolveResult, largest: Largest, where: str, index: tupl
     scene, worst = result.scene, max(largest)
     if is_small(worst) or worst < 2.0 * scene._warned_of_strain:
         return
-    strains = result.strains(*index)
+    strains = result._strains(*index)
     unit = f"{_UNIT_ADVICE} " if worst > _MISTAKEN else ""
     warning = LargeStrainWarning(f"{unit}{where}: {largest}. {_faces(strains)}. {_ADVICE}", result)
     warnings.warn(warning, stacklevel=callers_level())

@@ -33,6 +33,7 @@ _FRAME = 1.0 / 30.0  # [s] between two states while playing
 Coloring = Callable[[list[State]], tuple[list[State], Scalar | None]]
 
 
+_FARTHEST = 1e4  # [-] distance of a source from the bodies over their size: its field is not felt long before
 _GIZMO = 0.22  # [-] length of a handle's arrows over the size of the bodies
 
 
@@ -45,8 +46,8 @@ class LiveView:
     newest one is solved. Where the equilibrium jumps, the view shows the new one and says so. Where a solve fails, it
     says why and keeps the last equilibrium. An obstacle that has the center of a magnet moves with it.
 
-    url: the address of the view. It serves only this machine, unless ms.show was given another host. equilibrium: the last
-    one of a scene with a field, otherwise None. message: the note beside the view.
+    url: the address of the view, with its secret token. It serves only this machine, unless ms.show was given another
+    host. equilibrium: the last one of a scene with a field, otherwise None. message: the note beside the view.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.04, 0.01, cells=(8, 2))
@@ -62,6 +63,7 @@ class LiveView:
     def __init__(
         self,
         server: Any,
+        token: str,
         states: list[State],
         scalar: Scalar | None,
         stage: Stage,
@@ -77,7 +79,7 @@ class LiveView:
         self._gizmos: list[Gizmo] = []
         self._follower: Follower | None = None
         self._player: threading.Thread | None = None
-        self.url: str = f"http://{server.get_host()}:{server.get_port()}"
+        self.url: str = f"http://{server.get_host()}:{server.get_port()}/{token}/"
         self.equilibrium: Equilibrium | None = None
         self.message: str = ""
         if len(states) > 1:
@@ -138,7 +140,9 @@ class LiveView:
         """
         gizmo = self._gizmo_of(source, index)
         if center is not None:
-            gizmo.movable.center = np.array(quantity("center", "m", center, (3,)))
+            center = np.array(quantity("center", "m", center, (3,)))
+            gizmo.check_reachable(center)
+            gizmo.movable.center = center
         if rotation is not None:
             gizmo.movable.rotation = np.array(quantity("rotation", "rad", rotation, (3,)))
         gizmo.show()
@@ -202,7 +206,7 @@ class LiveView:
         self._follower = follower
         names = [f"/sources/{number}" for number in range(len(movables))]
         self._gizmos = [
-            Gizmo(self._server, self._stage, each, name, self._ask)
+            Gizmo(self._server, self._stage, each, name, self._ask, self._failed)
             for name, each in zip(names, movables, strict=True)
         ]
         if flux_density is not None:
@@ -302,7 +306,15 @@ class LiveView:
 class Gizmo:
     """The handle of one source: it moves the source's pose and calls `moved`."""
 
-    def __init__(self, server: Any, stage: Stage, movable: Movable, name: str, moved: Callable[[], None]):
+    def __init__(
+        self,
+        server: Any,
+        stage: Stage,
+        movable: Movable,
+        name: str,
+        moved: Callable[[], None],
+        refused: Callable[[Exception], None],
+    ):
         self.movable = movable
         self._stage = stage
         self._first = movable.center.copy(), movable.rotation.copy()
@@ -315,11 +327,32 @@ class Gizmo:
 
         @self.handle.on_update
         async def _(event: Any) -> None:  # in the server's loop, so that poses keep their order
-            movable.center = stage.from_view(self.handle.position)
-            movable.rotation = scipy.spatial.transform.Rotation.from_quat(
-                np.asarray(self.handle.wxyz), scalar_first=True
-            ).as_rotvec()
+            try:
+                movable.center, movable.rotation = self._pose_in_view()
+            except ValueError as error:
+                self.show()  # where the source still is
+                refused(error)
+                return
             moved()
+
+    def check_reachable(self, center: np.ndarray) -> None:
+        """Raise ValueError for a center that is too far away for a field."""
+        far = float(np.abs(center - self._stage.middle).max())
+        if not far <= _FARTHEST * self._stage.size:
+            raise ValueError(
+                f"center is {far:.3g} m from the bodies, more than {_FARTHEST:g} times their size of "
+                f"{self._stage.size:.3g} m"
+            )
+
+    def _pose_in_view(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the center and the rotation of the handle. Raises ValueError if they are none of a source."""
+        center = self._stage.from_view(quantity("position", "1", self.handle.position, (3,)))
+        self.check_reachable(center)
+        turned = np.array(quantity("wxyz", "1", self.handle.wxyz, (4,)))
+        length = np.linalg.norm(turned)
+        if not 0.5 < length < 2.0:  # 1 up to round-off
+            raise ValueError(f"wxyz must be a quaternion of length 1, got one of length {length:.3g}")
+        return center, scipy.spatial.transform.Rotation.from_quat(turned, scalar_first=True).as_rotvec()
 
     def show(self) -> None:
         """Move the handle to the pose of its source."""

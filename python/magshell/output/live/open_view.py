@@ -24,6 +24,7 @@ from ..plot.view import View, view_of
 from ..results.state import State, states_of, with_times
 from ..results.units import length_unit
 from .follower import Follower
+from .guard import Guard, guarded
 from .library import quiet, require_viser
 from .live_view import LiveView
 from .movable import movables_of
@@ -67,8 +68,9 @@ def show(
     speed: seconds of the motion per second of playing, by default as in `animate`.
     color, view, style: as in `plot`. The limits of colours of a scene grow with what is found. It shows no contacts.
     title: that of the panel.
-    host, port: the address that the view is served at. The default host serves this machine only. A port that is in use is
-        replaced by the next free one.
+    host, port: the address that the view is served at. The default host serves this machine only. A port that is in
+        use is replaced by the next free one. Only who knows the whole address, which contains a random token, can
+        open the view, and no page of another site can.
     browser: open the view in a browser, where there is a display. In a notebook it is shown below the cell instead.
 
     At the end of a script, `.wait()` keeps the view open. Raises ValueError on bad input, ImportError without viser, and
@@ -106,12 +108,19 @@ def show(
     seen, size = view_of(states, view), size_of(states)
     coloring = _Coloring(color, size)
     drawn, scalar = coloring(states) if not live else (on_surfaces(states), None)
-    with quiet():
-        server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+    guard, server = Guard(host), None
+    try:
+        with quiet(), guarded(guard):
+            server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+    except BaseException:
+        if server is not None:
+            with quiet():
+                server.stop()
+        raise
     try:
         sources = np.array([each.center for each in movables]).reshape(-1, 3)
         stage = Stage(server, drawn, size, style, seen, sources)
-        shown = LiveView(server, drawn, scalar, stage, None if states[0].time is None else speed)
+        shown = LiveView(server, guard.token, drawn, scalar, stage, None if states[0].time is None else speed)
         if live:
             follower = Follower(what, start, shown._found, shown._failed)
             shown._follow(follower, design, movables, coloring)

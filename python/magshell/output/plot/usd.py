@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.path_first import check_path_first
 from ..._input.quantity import quantity
 from ..._runtime.files import check_replaceable, replacing
 from ..._runtime.solver_entry_point import grouped
@@ -61,6 +62,7 @@ def write_usd(
     ...     ms.write_usd(f"{folder}/rise.usda", mesh, positions=rising).name
     'rise.usda'
     """
+    check_path_first("write_usd(path, what)", path, what)
     path = Path(path)
     if path.suffix.lower() not in ENDINGS:
         raise ValueError(f"cannot write {path.name!r}: the ending must be {', '.join(ENDINGS)}")
@@ -82,7 +84,10 @@ def write_usd(
     )
     with replacing(path) as part:
         part.unlink()  # OpenUSD makes its files itself
-        _write(pxr, part, motion, fps)
+        try:
+            _write(pxr, part, motion, fps)
+        except pxr.Tf.ErrorException as error:
+            raise OSError(str(error)) from error
     return path
 
 

@@ -48,7 +48,7 @@ def contact_loads(result: SolveResult, index: int) -> ContactLoads:
     scene, moving = result.scene, isinstance(result, Trajectory)
     values, state = result._values_at(index), result._state_at(index)
     found = [
-        result.contact_state(contact, index)
+        result._contact_state(contact, index)
         if moving
         else compute_contact_state(scene, values, contact, state)
         for contact in scene.contacts
@@ -71,11 +71,7 @@ def nodal_forces(result: Any, index: int) -> dict[str, np.ndarray]:
     if supports and isinstance(result, Equilibrium | Trajectory):
         forces = np.zeros((scene.mesh.n_vertices, 3))
         for support in supports:
-            held = (
-                result.reaction(support, index)
-                if isinstance(result, Trajectory)
-                else result.reaction(support)
-            )
+            held = result._reaction(support, index)
             np.add.at(forces, held.vertices, held.forces)
         found["reaction"] = forces
     if any(isinstance(load, DeadLoad) for load in scene.loads):

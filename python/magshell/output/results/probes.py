@@ -161,11 +161,11 @@ class Probe:
         body = self._body(result)
         weights = self._weights(result, body.mesh.n_vertices)
         if isinstance(result, EquilibriumSet):
-            return np.stack([self._stress_in(case[body].stresses(), body, weights) for case in result])
+            return np.stack([self._stress_in(case[body]._stresses(), body, weights) for case in result])
         of = result[body]
         if isinstance(result, Equilibrium):
-            return self._stress_in(of.stresses(), body, weights)
-        return np.stack([self._stress_in(of.stresses(k), body, weights) for k in range(len(result))])
+            return self._stress_in(of._stresses(), body, weights)
+        return np.stack([self._stress_in(of._stresses(k), body, weights) for k in range(len(result))])
 
     def _stress_in(self, stresses: Any, body: Shell | Solid, weights: Any) -> np.ndarray:
         """Return the mean over the probe's vertices or points of the stress averaged at the nodes, (6,) or ()."""
@@ -200,13 +200,13 @@ class Probe:
 
     def _force(self, result: Any, *index: int) -> np.ndarray:
         if self.what == "reaction":
-            return result.reaction(self.of, *index).force
-        return result.contact_state(self.of, *index).forces.sum(axis=0)
+            return result._reaction(self.of, *index).force
+        return result._contact_state(self.of, *index).forces.sum(axis=0)
 
     def _energy(self, result: Any) -> np.ndarray:
         if isinstance(result, EquilibriumSet):
             return np.array([float(self._energy(case)) for case in result])
-        energies = getattr(result, "energies", None)
+        energies = getattr(result, "_energies", None)
         if energies is None:
             raise ValueError(f"probe {self.name!r}: an {_kind(result)} holds no energies")
         if self.of not in energies:

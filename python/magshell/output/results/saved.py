@@ -45,8 +45,32 @@ def check_fits(held: dict[Any, Any], scene: Scene) -> None:
     shapes["_own_points"] = (*n, own, 3)
     for name, shape in shapes.items():
         optional = name in ("_own_points", "_own_velocities", "applied_flux_density")
-        if not (optional and held[name] is None):
-            quantity(name, "SI", held[name], shape)
+        if optional and held[name] is None:
+            continue
+        quantity(name, "SI", held[name], shape)
+        if (kind := np.asarray(held[name]).dtype.kind) != "f":
+            raise ValueError(f"{name} holds numbers of kind {kind!r} instead of real ones")
+    if of_motion and (np.diff(held["times"]) <= 0.0).any():
+        raise ValueError("its times do not rise")
+    _check_positions(held, model)
+
+
+def _check_positions(held: dict[Any, Any], model) -> None:
+    """Raise ValueError if the positions are not those of the state in the core, which solves continue from."""
+    positions = held["positions"]
+    if "times" in held:
+        if not len(positions) or abs(held["times"][-1] - held["end"].time) > 1e-9 * abs(held["end"].time):
+            return  # the end was not recorded
+        positions, state = positions[-1], held["end"].state
+    else:
+        state = held["_state"]
+    there = model.positions(state)
+    # Positions of single precision are rounded.
+    close = (
+        16.0 * np.finfo(np.asarray(positions).dtype).eps * max(float(np.abs(there).max(initial=0.0)), 1e-300)
+    )
+    if not np.abs(positions - there).max(initial=0.0) <= close:
+        raise ValueError("its positions are not those of its state")
 
 
 def _n_directions(scene: Scene) -> int:
@@ -104,6 +128,11 @@ def _parts(scene: Scene) -> dict[str, object]:
 _FORMAT = 1
 _KINDS = {each.__name__: each for each in (Equilibrium, EquilibriumSet, Trajectory)}
 _CONTENTS = "contents"
+# Fields that have another name in files: that of the property, which returns tensors in torch's graph.
+_IN_FILES = {
+    f"_{name}": name
+    for name in ("energies", "kinetic_energy", "largest_membrane_strain", "largest_bending_strain")
+}
 
 
 @register_method
@@ -220,7 +249,9 @@ def _fields(result, scene: Scene) -> dict[Any, Any]:
     if isinstance(result, EquilibriumSet):
         return {"_cases": [_fields(case, scene) for case in result]}
     numbers = {id(each): k for k, each in enumerate((scene, *scene.objects))}
-    held = {name: value for name, value in result.__getstate__().items() if name != "scene"}
+    held = {
+        _IN_FILES.get(name, name): value for name, value in result.__getstate__().items() if name != "scene"
+    }
     for name in ("replaced", "paths"):
         if name in held["_values"]:
             held["_values"] = {**held["_values"], name: _numbered(held["_values"][name], numbers)}
@@ -246,13 +277,14 @@ def _made(kind: type[Any], held: dict[Any, Any], scene: Scene):
     if "_varied" in held:
         held["_varied"] = {(objects[number], name): rows for (number, name), rows in held["_varied"].items()}
     check_fits(held, scene)
+    fields = {name: held[_IN_FILES.get(name, name)] for name in kind.__dataclass_fields__.keys() - {"scene"}}
     result = object.__new__(kind)
-    result.__setstate__({"scene": scene, **held})
+    result.__setstate__({"scene": scene, **fields})
     return result
 
 
 def _expected(kind: type[Any]) -> set[str]:
-    return kind.__dataclass_fields__.keys() - {"scene"}
+    return {_IN_FILES.get(name, name) for name in kind.__dataclass_fields__.keys() - {"scene"}}
 
 
 def _names(held, prefix: str = "") -> Iterator[tuple[int, str]]:

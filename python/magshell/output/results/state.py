@@ -275,7 +275,7 @@ def _with_elements(result, states: list[State], positions) -> list[State]:
 
     def elements_of(k: int):
         return lambda: [
-            (span.first_face, body.mesh, result_of(result, body).stresses(k))
+            (span.first_face, body.mesh, result_of(result, body)._stresses(k))
             for body, span in zip(bodies.deformable, bodies.spans, strict=True)
         ]
 

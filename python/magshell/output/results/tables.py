@@ -164,18 +164,19 @@ def _own_columns(result) -> dict[str, tuple[str, np.ndarray]]:
             for name, (unit, _) in (cases[0] if cases else {}).items()
         }
     found = {
-        f"{term}_energy": ("J", np.asarray(each)) for term, each in getattr(result, "energies", {}).items()
+        f"{term}_energy": ("J", np.asarray(each)) for term, each in getattr(result, "_energies", {}).items()
     }
     if isinstance(result, Trajectory):
-        found["kinetic_energy"] = ("J", result.kinetic_energy)
+        found["kinetic_energy"] = ("J", result._kinetic_energy)
     if isinstance(result, EquilibriumPath):
         found["n_negative_eigenvalues"] = ("1", result.n_negative_eigenvalues)
     if result.scene.loads or result.scene.actuators:
         found["load_factor"] = ("1", np.asarray(result._load_factors))
     if any(not isinstance(each, UniformField) for each in result.scene.fields):
         found["field_factor"] = ("1", field_factors(result))
-    for name in ("largest_membrane_strain", "largest_bending_strain"):
-        found[name] = ("1", np.asarray(getattr(result, name)))
+    strains = result._largest_strains
+    for kind in ("membrane", "bending"):
+        found[f"largest_{kind}_strain"] = ("1", np.asarray(getattr(strains, kind)))
     return found
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
+from ..._input.tensor_kinds import numbers_of as numbers_outside_transforms
 from ..._input.tensor_kinds import why_not
 from ...errors import NoGradient
 
@@ -156,7 +157,7 @@ class _Transposed(torch.autograd.Function):
 
     @staticmethod
     def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
-        return _looped(_Transposed, info.batch_size, in_dims, inputs)
+        return looped(_Transposed, info.batch_size, in_dims, inputs)
 
 
 class _Tangent(torch.autograd.Function):
@@ -180,15 +181,15 @@ class _Tangent(torch.autograd.Function):
 
     @staticmethod
     def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
-        return _looped(_Tangent, info.batch_size, in_dims, inputs)
+        return looped(_Tangent, info.batch_size, in_dims, inputs)
 
 
-def _looped(function: Any, count: int, in_dims: tuple[Any, ...], inputs: tuple[Any, ...]):
+def looped(function: Any, count: int, in_dims: tuple[Any, ...], inputs: tuple[Any, ...]):
     """Apply a function to each member of a batch, and stack the results."""
     found = [
         function.apply(
             *(
-                each if dim is None else each.select(dim, member)
+                each.select(dim, member) if isinstance(dim, int) else each
                 for each, dim in zip(inputs, in_dims, strict=True)
             )
         )
@@ -234,7 +235,7 @@ class _ZeroWithCurvature(torch.autograd.Function):
 
     @staticmethod
     def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
-        return _looped(_ZeroWithCurvature, info.batch_size, in_dims, inputs)
+        return looped(_ZeroWithCurvature, info.batch_size, in_dims, inputs)
 
 
 class _Curvature(torch.autograd.Function):
@@ -261,7 +262,7 @@ class _Curvature(torch.autograd.Function):
 
     @staticmethod
     def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
-        return _looped(_Curvature, info.batch_size, in_dims, inputs)
+        return looped(_Curvature, info.batch_size, in_dims, inputs)
 
 
 _THIRD_OF_SOLVES = "no third derivatives of a solve: take differences of the second ones"
@@ -384,6 +385,10 @@ class _Mapped(torch.autograd.Function):
 
     @staticmethod
     def vmap(info: Any, in_dims: tuple[Any, ...], solves: Any, *tensors: torch.Tensor) -> tuple[Any, Any]:
+        if any(map(is_batched, tensors)):
+            raise ValueError(
+                "torch.vmap inside of torch.vmap: reshape both axes to one, map once, and reshape the results"
+            )
         found = solves.solve(_in_front(info.batch_size, in_dims[1:], tensors))
         return found, (0,) * len(found)
 
@@ -501,7 +506,7 @@ def numbers_of(by_output: torch.Tensor) -> np.ndarray:
     """Return a derivative by a result as an array. Raises NoGradient inside transforms that cannot be served."""
     if why := why_not(by_output):
         raise NoGradient(f"no gradient here: the one by a result {why}")
-    return by_output.detach().cpu().double().numpy()
+    return numbers_outside_transforms(by_output).astype(np.float64, copy=False)
 
 
 def solved(
@@ -512,15 +517,15 @@ def solved(
 
 
 class _Refused(torch.autograd.Function):
-    """The numbers of a tensor by which there is no gradient."""
+    """Numbers in the graph of a tensor by which they have no gradient: its own, if there are no others."""
 
     @staticmethod
-    def forward(tensor: torch.Tensor, why: str) -> torch.Tensor:
-        return tensor.clone()
+    def forward(tensor: torch.Tensor, numbers: np.ndarray | None, why: str) -> torch.Tensor:
+        return tensor.clone() if numbers is None else torch.from_numpy(numbers).to(tensor)
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: torch.Tensor) -> None:
-        ctx.why = inputs[1]
+        ctx.why = inputs[2]
 
     @staticmethod
     def backward(ctx: Any, *by_outputs: torch.Tensor) -> None:
@@ -533,7 +538,12 @@ class _Refused(torch.autograd.Function):
 
 def refused(tensor: torch.Tensor, name: str, why: str) -> torch.Tensor:
     """Return the numbers of a tensor; NoGradient says why there is no gradient by it where one is asked for."""
-    return _Refused.apply(tensor, f"no gradient by {name}: {why}")
+    return _Refused.apply(tensor, None, f"no gradient by {name}: {why}")
+
+
+def numbers_refusing(numbers: np.ndarray, source: torch.Tensor, why: str) -> torch.Tensor:
+    """Return numbers as a tensor in the graph of another one, the source: a gradient by it raises NoGradient(why)."""
+    return _Refused.apply(source, np.array(numbers, dtype=np.float64), why)
 
 
 def is_transformed(tensor: torch.Tensor) -> bool:

@@ -47,7 +47,10 @@ class Member(NamedTuple):
         pairs = list(zip(self.tensors, along, strict=True))
         changes = [change for leaf in self.leaves for each, change in pairs if each is leaf]
         if len(changes) < len(self.leaves):
-            raise NoGradient("no tangents of a batch by values that a solve computes further ones from")
+            raise NoGradient(
+                "no tangents of a batch by a value from which each member computes other ones before its solve, as a "
+                "motion does from a value that varies in time: take torch.func.jvp of single members, or gradients"
+            )
         return self.adjoint.tangents(changes)
 
 

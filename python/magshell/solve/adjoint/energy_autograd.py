@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 
 from ...errors import NoGradient
-from .autograd import numbers_of
+from .autograd import looped, numbers_of
 from .curvature import moved_inputs, rows_of
 from .differences import directional_derivative
 from .energy import POSITIONAL, EnergyAdjoint
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 _THIRD = (
     "no third derivatives of energies: there are gradients and Hessians. Take differences of the second ones."
+)
+_FORWARD = (
+    "no tangents of energies and forces: torch.func.grad, vjp and jacrev have their derivatives, and jacrev of jacrev or "
+    "ms.hessian the second ones"
 )
 # Fractions (1) of the first step that are tried. Tested by test_second_derivatives_by_values_agree_with_differences.
 _SHORTER = (1.0, 0.1, 1e-2)
@@ -35,15 +39,23 @@ class _Energies(torch.autograd.Function):
 
     @staticmethod
     def forward(
-        ctx: Any, adjoint: EnergyAdjoint, energies: np.ndarray, dtype: torch.dtype, *leaves: torch.Tensor
+        adjoint: EnergyAdjoint, energies: np.ndarray, dtype: torch.dtype, *leaves: torch.Tensor
     ) -> torch.Tensor:
-        ctx.adjoint, ctx.leaves, ctx.dtype = adjoint, leaves, dtype
         return torch.from_numpy(energies).to(dtype=dtype)
 
     @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: torch.Tensor) -> None:
+        ctx.adjoint, _, ctx.dtype, *leaves = inputs
+        ctx.leaves = leaves
+
+    @staticmethod
     def backward(ctx: Any, by_energies: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-        found = ctx.adjoint.gradients(numbers_of(by_energies), ctx.needs_input_grad[3:])
-        by_leaves = _like_leaves(found, ctx.leaves)
+        wanted = ctx.needs_input_grad[3:]
+        by_leaves = _on_arrays(
+            lambda weights: _like_leaves(ctx.adjoint.gradients(weights, wanted), ctx.leaves),
+            wanted,
+            by_energies,
+        )
         if torch.is_grad_enabled():  # create_graph=True
             positional = [is_positional(leaf) for leaf in ctx.adjoint.inputs.leaves]
             asked = [each is not None for each in by_leaves]
@@ -60,31 +72,86 @@ class _Energies(torch.autograd.Function):
                     by_leaves[k] = each
         return None, None, None, *by_leaves
 
+    @staticmethod
+    def jvp(ctx: Any, *_: torch.Tensor | None) -> torch.Tensor:
+        raise NoGradient(_FORWARD)
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[torch.Tensor, Any]:
+        raise NoGradient(_FORWARD)  # positions inside a map are refused, so this is torch.func.jacfwd
+
+
+class _OnArrays(torch.autograd.Function):
+    """A function of tensors that is computed on arrays and not differentiated further, also inside torch.func."""
+
+    @staticmethod
+    def forward(
+        compute: Callable[..., list[torch.Tensor]], *tensors: torch.Tensor
+    ) -> tuple[torch.Tensor, ...]:
+        return tuple(compute(*map(numbers_of, tensors)))
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        pass
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
+        return looped(_OnArrays, info.batch_size, in_dims, inputs)
+
+
+def _on_arrays(
+    compute: Callable[..., list[torch.Tensor | None]], asked: Sequence[bool], *tensors: torch.Tensor
+) -> list[torch.Tensor | None]:
+    """Return what `compute` makes of the numbers of tensors; asked: where it is not None."""
+    found = iter(
+        _OnArrays.apply(
+            lambda *arrays: [each for each in compute(*arrays) if each is not None],
+            *(each.detach() for each in tensors),
+        )
+    )
+    return [next(found) if is_asked else None for is_asked in asked]
+
 
 class _GradientByValues(torch.autograd.Function):
     """Computed gradients of weighted energies with respect to some leaves that are values, connected to all leaves."""
 
     @staticmethod
     def forward(
-        ctx: Any, adjoint: EnergyAdjoint, chosen: list[int], weights: torch.Tensor, *tensors: torch.Tensor
+        adjoint: EnergyAdjoint, chosen: list[int], weights: torch.Tensor, *tensors: torch.Tensor
     ) -> tuple[torch.Tensor, ...]:
-        ctx.adjoint, ctx.chosen, ctx.weights, ctx.leaves = adjoint, chosen, weights, tensors[len(chosen) :]
         return tuple(each.clone() for each in tensors[: len(chosen)])
 
     @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        ctx.adjoint, ctx.chosen, ctx.weights, *tensors = inputs
+        ctx.leaves = tensors[len(ctx.chosen) :]
+
+    @staticmethod
     def backward(ctx: Any, *motion: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-        along: list[np.ndarray | None] = [None] * len(ctx.leaves)
-        for k, each in zip(ctx.chosen, motion, strict=True):
-            along[k] = numbers_of(each)
         wanted = ctx.needs_input_grad[3 + len(ctx.chosen) :]
-        by_weights, found = rates_along_values(ctx.adjoint, numbers_of(ctx.weights), along, wanted)
-        by_inputs = [torch.from_numpy(by_weights).to(ctx.weights), *_like_leaves(found, ctx.leaves)]
+
+        def rates(weights: np.ndarray, *changes: np.ndarray) -> list[torch.Tensor | None]:
+            along: list[np.ndarray | None] = [None] * len(ctx.leaves)
+            for k, each in zip(ctx.chosen, changes, strict=True):
+                along[k] = each
+            by_weights, found = rates_along_values(ctx.adjoint, weights, along, wanted)
+            return _like_leaves([by_weights, *found], [ctx.weights, *ctx.leaves])
+
+        by_inputs = _on_arrays(rates, [True, *wanted], ctx.weights, *motion)
         if torch.is_grad_enabled():
             given = [each for each in by_inputs if each is not None]
             marked = iter(_NoFurther.apply(_THIRD, len(given), *given, ctx.weights, *ctx.leaves, *motion))
             by_inputs = [None if each is None else next(marked) for each in by_inputs]
         by_weights, *by_leaves = by_inputs
         return None, None, by_weights, *(None for _ in ctx.chosen), *by_leaves
+
+    @staticmethod
+    def jvp(ctx: Any, *_: torch.Tensor | None) -> tuple[torch.Tensor, ...]:
+        raise NoGradient(_FORWARD)
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
+        return looped(_GradientByValues, info.batch_size, in_dims, inputs)
 
 
 class _WeightedGradient(torch.autograd.Function):
@@ -94,19 +161,26 @@ class _WeightedGradient(torch.autograd.Function):
 
     @staticmethod
     def forward(
-        ctx: Any, adjoint: EnergyAdjoint, dtype: torch.dtype, weights: torch.Tensor, *leaves: torch.Tensor
+        adjoint: EnergyAdjoint, dtype: torch.dtype, weights: torch.Tensor, *leaves: torch.Tensor
     ) -> tuple[torch.Tensor, ...]:
-        ctx.adjoint, ctx.weights, ctx.leaves = adjoint, weights, leaves
         return tuple(
             torch.from_numpy(each).to(dtype=dtype) for each in adjoint.weighted_gradient(numbers_of(weights))
         )
 
     @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        ctx.adjoint, _, ctx.weights, *leaves = inputs
+        ctx.leaves = leaves
+
+    @staticmethod
     def backward(ctx: Any, *motion: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
-        arrays = [numbers_of(each) for each in motion]
         is_asked, *wanted = ctx.needs_input_grad[2:]
-        by_weights, found = ctx.adjoint.mixed(numbers_of(ctx.weights), *arrays, is_asked, wanted)
-        by_inputs = _like_leaves([by_weights, *found], [ctx.weights, *ctx.leaves])
+
+        def mixed(weights: np.ndarray, *arrays: np.ndarray) -> list[torch.Tensor | None]:
+            by_weights, found = ctx.adjoint.mixed(weights, *arrays, is_asked, wanted)
+            return _like_leaves([by_weights, *found], [ctx.weights, *ctx.leaves])
+
+        by_inputs = _on_arrays(mixed, [is_asked, *wanted], ctx.weights, *motion)
         if torch.is_grad_enabled():
             given = [each for each in by_inputs if each is not None]
             others = (ctx.weights, *ctx.leaves, *motion)
@@ -114,23 +188,42 @@ class _WeightedGradient(torch.autograd.Function):
             by_inputs = [None if each is None else next(marked) for each in by_inputs]
         return None, None, *by_inputs
 
+    @staticmethod
+    def jvp(ctx: Any, *_: torch.Tensor | None) -> tuple[torch.Tensor, ...]:
+        raise NoGradient(_FORWARD)
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
+        return looped(_WeightedGradient, info.batch_size, in_dims, inputs)
+
 
 class _NoFurther(torch.autograd.Function):
     """Gradients connected to the tensors that they depend on, so that their derivatives raise NoGradient, with a reason."""
 
     @staticmethod
-    def forward(ctx: Any, reason: str, count: int, *given: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        ctx.reason = reason
+    def forward(reason: str, count: int, *given: torch.Tensor) -> tuple[torch.Tensor, ...]:
         return tuple(each.clone() for each in given[:count])
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:
+        ctx.reason = inputs[0]
 
     @staticmethod
     def backward(ctx: Any, *_: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         raise NoGradient(ctx.reason)
 
+    @staticmethod
+    def jvp(ctx: Any, *_: torch.Tensor | None) -> tuple[torch.Tensor, ...]:
+        raise NoGradient(ctx.reason)
+
+    @staticmethod
+    def vmap(info: Any, in_dims: tuple[Any, ...], *inputs: Any) -> tuple[tuple[torch.Tensor, ...], Any]:
+        return looped(_NoFurther, info.batch_size, in_dims, inputs)
+
 
 def _like_leaves(found, leaves) -> list[torch.Tensor | None]:
     return [
-        None if values is None else torch.from_numpy(np.array(values)).to(leaf)
+        None if values is None else torch.from_numpy(np.array(values)).to(leaf.device, leaf.dtype)
         for values, leaf in zip(found, leaves, strict=True)
     ]
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..._input.arrays import count
 from ..._input.quantity import quantity
 from ..._input.tensors import is_tensor, requires_gradient
+from ..._input.without_gradient import without_gradient
 from ..._runtime.frozen import immutable
 from ..._runtime.solve_keywords import SOLVE_KEYWORDS
 from ..._runtime.worker_threads import checked_threads
@@ -28,6 +29,7 @@ from .single_motion import MotionOptions, arrays_of, preparation, run
 from .trajectory import MotionState, Trajectory
 
 if TYPE_CHECKING:
+    from ..._input.kinds import Computed
     from ...model.scene.scene import Scene
     from .trajectory import Trajectory
 
@@ -234,10 +236,11 @@ class TrajectoryBatch(BatchOfPositions):
     _rest: Any = field(repr=False, default=None)
 
     @property
-    def energy(self) -> np.ndarray:
+    def energy(self) -> Computed:
         """The kinetic and potential energies together, (k, n) J; nan for members that failed."""
         missing = np.full(len(self.times), np.nan)
-        return np.stack([missing if each is None else each.energy for each in self._members])
+        energies = np.stack([missing if each is None else each._energy for each in self._members])
+        return without_gradient(energies, self.positions, "result.energy")
 
     def __getitem__(self, index: int) -> Trajectory:
         """Return the motion of one member, or raise the error that it ended with."""

@@ -182,4 +182,4 @@ def simulate(
     if threads is not None:
         raise ValueError("threads is the number of threads of a batch: give batch=k, or ms.set_num_threads")
     with SolveBar("simulate", progress) as bar:
-        return run(scene, arguments, options, bar.to).result
+        return run(scene, arguments, options, bar.to, bar.note).result

@@ -17,6 +17,7 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.fields.magnets import describe_magnet_overlap
+from ...model.results.crossings import crossing_bodies, describe_attraction
 from ...model.scene.field_sampling import (
     element_errors,
     sampling_errors,
@@ -43,6 +44,7 @@ from ..options import (
     SDIRK3,
     Adaptive,
     AdjointStorage,
+    ImplicitEuler,
     Integrator,
     Newton,
     ProjectiveDynamics,
@@ -143,22 +145,27 @@ def preparation(
     return prepared
 
 
+def _ignore(text: str) -> None:
+    """Discard a note on the progress."""
+
+
 def run(
     scene: Scene,
     arguments: dict[str, Any],
     options: MotionOptions,
     progress: Callable[[float], None],
+    note: Callable[[str], None] = _ignore,
 ) -> Motion:
     """Simulate one motion, with the arguments and the errors of ms.simulate.
 
-    progress: called now and then with the fraction that is done.
+    progress: called now and then with the fraction that is done. note: called once if many steps are taken in parts.
     """
     time_step = arguments["time_step"]
     prepared = preparation(scene, arguments, options)
     motion_inputs = prepared(None)
     scene = motion_inputs.inputs.scene  # another scene if values replace rest positions
     began = time.perf_counter()
-    watch = stop_at_once if motion_inputs.interrupted else lambda fraction, residual: progress(fraction)
+    watch = stop_at_once if motion_inputs.interrupted else Watch(progress, note)
     along = None if isinstance(time_step, Adaptive) else _requested_tangents(motion_inputs)
     known = None
     check_magnets_apart(scene, scene._model.positions(motion_inputs.start.state))
@@ -198,11 +205,11 @@ def run(
         if isinstance(time_step, Adaptive):
             shortest = motion_inputs.time_steps.clock.time_step / 2**time_step._deepest
             where = f"{found.steps_done}, at {result.end.time:.6g} s, failed even with a length of {shortest:.3g} s"
-        advice = _advice(result, isinstance(time_step, Adaptive))
+        advice = _advice(result, isinstance(time_step, Adaptive), found.reason)
         raise NotConverged(
             f"step {where}: {found.reason}. {advice} The motion until there is in `error.last_good`.", result
         )
-    bending = result.energies.get("bending", np.zeros(len(result)))
+    bending = result._energies.get("bending", np.zeros(len(result)))
     most = int(np.argmax(bending))
     positions = np.asarray(detached(result.positions[most]), dtype=np.float64)
     where = f"the motion, at {result.times[most]:.4g} s,"
@@ -215,6 +222,21 @@ def run(
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Motion(result, motion_inputs, found)
+
+
+class Watch:
+    """Passes on what the core reports while it takes steps: the fraction that is done, and once, in a note, the
+    shortest part [s] of many divided steps.
+    """
+
+    def __init__(self, progress: Callable[[float], None], note: Callable[[str], None]):
+        self._progress, self._note, self._told = progress, note, False
+
+    def __call__(self, fraction: float, shortest_part: float) -> None:
+        if shortest_part > 0.0 and not self._told:
+            self._told = True
+            self._note(f"ten steps were too long and divided: steps of {shortest_part:.2g} s would do")
+        self._progress(fraction)
 
 
 def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
@@ -233,13 +255,23 @@ def _reshaped(scene: Scene, values: Any, start: Any) -> tuple[Scene, Any]:
     return there, values
 
 
-def _advice(result: Trajectory, chosen: bool) -> str:
-    """Return the advice for an error message about a step that failed. chosen: by ms.Adaptive."""
+def _advice(result: Trajectory, chosen: bool, reason: str) -> str:
+    """Return the advice for an error message about a step that failed, and why. chosen: by ms.Adaptive."""
     fields = map(result._values_at(len(result) - 1).current, result.scene.fields)
     positions = np.asarray(detached(result.positions[-1]), dtype=np.float64)
+    if result.scene.own_field is not None and (met := crossing_bodies(result.scene, positions)):
+        return (
+            f"{met} attract each other by their own field and have met: nothing but an ms.Contact of the two keeps them "
+            "apart."
+        )
+    if "forces of friction" in reason and isinstance(result.integrator, ImplicitEuler):
+        return (
+            "Take the default integrator, ms.TRBDF2(implicit_contact=True), which finds them in longer steps, shorter "
+            "steps, or Contact(lagged_friction=True)."
+        )
     overlap = describe_magnet_overlap(fields, positions, result.scene.mesh.edge_lengths)
     if overlap or not chosen:
-        return overlap or "Take shorter steps."
+        return overlap or f"Take shorter steps. {describe_attraction(result.scene)}".rstrip()
     return (
         "Take a larger tolerance, or more halvings; errors that do not fall with the step come from motors that jump, from "
         "contacts that open and close in every step, or from round-off."
@@ -250,12 +282,12 @@ def _with_strains(result: Trajectory) -> Trajectory:
     """Return the motion with its largest strains computed again, state by state, if sheets grew during it."""
     if not any(isinstance(owner, Shell) for owner, _ in result._varied):
         return result
-    strain = StrainHistory.of_each(result.strains(k) for k in range(len(result)))
-    return replace(result, largest_membrane_strain=strain.membrane, largest_bending_strain=strain.bending)
+    strain = StrainHistory.of_each(result._strains(k) for k in range(len(result)))
+    return replace(result, _largest_membrane_strain=strain.membrane, _largest_bending_strain=strain.bending)
 
 
 def _warn(result: Trajectory) -> None:
-    strain = StrainHistory(result.largest_membrane_strain, result.largest_bending_strain)
+    strain = result._largest_strains
     k = strain.worst
     warn_if_large(
         result, strain.at(k), f"the motion, in recorded state {k}, at {result.times[k]:.6g} s", (k,)
@@ -265,13 +297,13 @@ def _warn(result: Trajectory) -> None:
 def _warn_of_fields(result: Trajectory) -> None:
     """Warn of coarsely sampled fields in the state of largest magnetic energy, where magnets are nearest."""
     if result.scene.own_field is not None:
-        energies = result.energies["own field"]
+        energies = result._energies["own field"]
         for k in sorted({int(np.argmin(energies)), int(np.argmax(energies))}):  # bodies are nearest at one
             where = f"the motion, in recorded state {k}, at {result.times[k]:.6g} s"
             warn_of_gaps(gap_errors(result._values_at(k), result._state_at(k)), where)
     if not result.scene.fields:
         return
-    k = int(np.argmax(np.abs(result.energies.get("magnetic", np.zeros(len(result))))))
+    k = int(np.argmax(np.abs(result._energies.get("magnetic", np.zeros(len(result))))))
     flux_density = result.applied_flux_density
     where = f"the motion, in recorded state {k}, at {result.times[k]:.6g} s"
     state = (
@@ -318,10 +350,10 @@ def _trajectory(motion_inputs: MotionInputs, found, wall_time: float, known=None
         edge_rotations=edge_rotations,
         remanent_magnetization=motion_inputs.inputs.given_magnetization,
         applied_flux_density=motion_inputs.recorded("applied_flux_density", after),
-        kinetic_energy=np.array(found.kinetic_energy),
-        energies=_by_name(model.term_names, by_term),
-        largest_membrane_strain=strain.membrane,
-        largest_bending_strain=strain.bending,
+        _kinetic_energy=np.array(found.kinetic_energy),
+        _energies=_by_name(model.term_names, by_term),
+        _largest_membrane_strain=strain.membrane,
+        _largest_bending_strain=strain.bending,
         steps=motion_inputs.steps,
         steps_done=int(np.searchsorted(grid.grid_ends, found.steps_done, side="right")) - 1,
         substeps={step: len(parts) for step, parts in found.substeps.items() if len(parts) > 1},

@@ -12,15 +12,16 @@ import numpy as np
 from ..._input.arrays import index_array
 from ..._input.quantity import quantity
 from ..._input.tensors import detached, plain_arrays
+from ..._input.without_gradient import without_gradient
 from ..._runtime.files import replace_file
-from ..._runtime.frozen import immutable
+from ..._runtime.frozen import FixedDict, immutable
 from ..._runtime.mixins import AnimateMixin
 from ..._runtime.npz import open_npz
-from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.attached_obstacles import positioned
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
 from ...model.contact.contacts_to_core import near_kinks
+from ...model.results.crossings import describe_crossings
 from ...model.results.result_lookup import OfOneBody, displacements_of, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
@@ -129,11 +130,8 @@ class Trajectory(AnimateMixin, OfOneBody):
     Arrays have the rows of all bodies one after another; `trajectory[body]` has those of one body.
 
     times: (n,) s, of the recorded states, including the start. positions: (n, n_v, 3) m; velocities: (n, n_v, 3) m/s;
-    edge_rotations: (n, n_e) rad. kinetic_energy: (n,) J; energies: {term: (n,)} J, NaN where Ctrl-C interrupted their
-    computation.
+    edge_rotations: (n, n_e) rad.
     remanent_magnetization: as given, A/m, or None; applied_flux_density: (n, 3) T, the uniform part at those times.
-    largest_membrane_strain, largest_bending_strain: (n,), 1, the largest magnitudes of the strains that `strains` returns.
-        The model is for strains below 0.2; ms.LargeStrainWarning warns beyond.
     steps: the number of intervals of the time grid, as given. steps_done: equal to `steps` unless the simulation stopped
         early.
     time_steps: (m,) s, the lengths of the steps done: one for each interval, or more where ms.Adaptive or the caller divided
@@ -148,6 +146,9 @@ class Trajectory(AnimateMixin, OfOneBody):
     energy_watched: False if there is contact and loads have no potential (pressure, torques of joints): steps that create
         energy in contact are not found then.
     end: the last state, from which another simulation continues. bytes: memory of the data stored for gradients.
+
+    Where an input was a tensor that requires a gradient, energies, strains, stresses and forces are in torch's graph too,
+    and raise NoGradient if they are differentiated. Copies, pickles and files hold arrays in place of all tensors.
     """
 
     scene: Scene
@@ -158,10 +159,10 @@ class Trajectory(AnimateMixin, OfOneBody):
     edge_rotations: Any
     remanent_magnetization: Any
     applied_flux_density: np.ndarray
-    kinetic_energy: np.ndarray
-    energies: dict[str, np.ndarray]
-    largest_membrane_strain: np.ndarray
-    largest_bending_strain: np.ndarray
+    _kinetic_energy: np.ndarray = field(repr=False)
+    _energies: dict[str, np.ndarray] = field(repr=False)
+    _largest_membrane_strain: np.ndarray = field(repr=False)
+    _largest_bending_strain: np.ndarray = field(repr=False)
     steps: int
     steps_done: int
     substeps: dict[int, int]
@@ -244,9 +245,44 @@ class Trajectory(AnimateMixin, OfOneBody):
         return tuple(self._values.current(each) for each in self.scene.obstacles)
 
     @property
-    def energy(self) -> np.ndarray:
+    def energy(self) -> Computed:
         """The kinetic and potential energy together, (n,) J."""
-        return self.kinetic_energy + sum(self.energies.values())
+        return without_gradient(self._energy, self.positions, "result.energy")
+
+    @property
+    def _energy(self) -> np.ndarray:
+        energy = self._kinetic_energy + sum(self._energies.values())
+        energy.setflags(write=False)  # as the other arrays
+        return energy
+
+    @property
+    def energies(self) -> Computed:
+        """The potential energies of the terms, {name: (n,)} J, NaN where Ctrl-C interrupted their computation."""
+        return without_gradient(FixedDict(self._energies), self.positions, "result.energies[name]")
+
+    @property
+    def kinetic_energy(self) -> Computed:
+        """The kinetic energy, (n,) J."""
+        return without_gradient(self._kinetic_energy, self.positions, "result.kinetic_energy")
+
+    @property
+    def largest_membrane_strain(self) -> Computed:
+        """The largest magnitudes of the membrane strains that `strains` returns, (n,).
+
+        The model is for strains below 0.2; ms.LargeStrainWarning warns beyond.
+        """
+        largest = self._largest_membrane_strain
+        return without_gradient(largest, self.positions, "result.largest_membrane_strain")
+
+    @property
+    def largest_bending_strain(self) -> Computed:
+        """The largest magnitudes of the bending strains that `strains` returns, (n,); valid up to 0.2 as well."""
+        largest = self._largest_bending_strain
+        return without_gradient(largest, self.positions, "result.largest_bending_strain")
+
+    @property
+    def _largest_strains(self) -> StrainHistory:
+        return StrainHistory(self._largest_membrane_strain, self._largest_bending_strain)
 
     @property
     def nonsmooth_vertices(self) -> dict[int, np.ndarray]:
@@ -290,15 +326,18 @@ class Trajectory(AnimateMixin, OfOneBody):
     def _near_body_kinks(self, contact: BodyContact, index: int) -> np.ndarray:
         smoothing = self._values.current(contact).smoothing
         positions = self.scene._model.points(self._state_at(index))
-        return near_body_kinks(self.scene, self.contact_state(contact, index), smoothing, positions)
+        return near_body_kinks(self.scene, self._contact_state(contact, index), smoothing, positions)
 
     def strains(self, index: int = -1) -> Any:
         """Return the principal strains of all faces of the shells in a recorded state, by default the last, as Strains.
 
         In a scene of one solid, return those of trajectory[solid].
         """
+        return without_gradient(self._strains(index), self.positions, "result.strains()")
+
+    def _strains(self, index: int = -1) -> Any:
         if (solid := self._one_solid()) is not None:
-            return solid.strains(index)
+            return solid._states(index)
         state = self._state_at(index)
         with self._values_at(index).growth_in_core():
             return strains_of(self.scene, state, self._thickness)
@@ -320,6 +359,10 @@ class Trajectory(AnimateMixin, OfOneBody):
 
     def contact_state(self, contact: BodyContact | Contact, index: int = -1) -> ContactState:
         """Return the active pairs of a contact and their forces in a recorded state, by default the last."""
+        found = self._contact_state(contact, index)
+        return without_gradient(found, self.positions, "result.contact_state(contact)")
+
+    def _contact_state(self, contact: BodyContact | Contact, index: int = -1) -> ContactState:
         own = () if self._own_velocities is None else (self._own_velocities,)
         velocities = np.concatenate(
             [np.asarray(detached(each)[index], dtype=np.float64) for each in (self.velocities, *own)]
@@ -332,6 +375,9 @@ class Trajectory(AnimateMixin, OfOneBody):
 
         They include inertia and damping and are those at the end of the step that led there; NaN at the start.
         """
+        return without_gradient(self._reaction(support, index), self.positions, "result.reaction(support)")
+
+    def _reaction(self, support: Pin | Clamp | SymmetryPlane | Periodic, index: int = -1) -> Reaction:
         return reaction_in(self.scene, support, self._state_at(index), self._held_forces[index])
 
     def self_intersections(self, index: int = -1) -> np.ndarray:
@@ -352,8 +398,7 @@ class Trajectory(AnimateMixin, OfOneBody):
             if self.energy_watched
             else "  gains of energy in contact were not watched for, because of follower loads\n"
         )
-        strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
-        crossings = describe_self_intersections(self.scene.mesh, detached(self.positions))
+        crossings = describe_crossings(self.scene, detached(self.positions))
         taken = len(self.time_steps)
         a_step = 1e3 * self.wall_time / max(taken, 1)
         method = repr(self.integrator).removesuffix("()")
@@ -363,7 +408,7 @@ class Trajectory(AnimateMixin, OfOneBody):
             f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
             f"{method}\n"
             f"  {describe_steps(self)}\n"
-            f"  {describe_strains(self, strain)}\n"
+            f"  {describe_strains(self, self._largest_strains)}\n"
             f"  {crossings}\n"
             f"{watched}"
             f"  {self.iterations} iterations, {self.factorizations} factorizations\n"

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...model.bodies.bodies import called
 from ...model.fields.magnets import describe_magnet_overlap
+from ...model.results.crossings import describe_attraction
 from ...model.scene.own_field_errors import describe_coincident_points
 from ...model.shells.obtuse_faces import describe_faces
 from ...model.supports.constraints import free_rigid_motions
@@ -77,7 +78,8 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
             return " ".join([*sentences, inside, kept])
         if touching := describe_coincident_points(inputs.values, failed.state):
             return " ".join([*sentences, touching, kept])
-    return " ".join([*sentences, _advice(inputs, found, at_rest, near), kept])
+    advice = _advice(inputs, found, at_rest, near)
+    return " ".join(filter(None, [*sentences, advice, describe_attraction(scene), kept]))
 
 
 def _seen(inputs, found) -> list[str]:

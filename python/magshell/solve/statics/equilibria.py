@@ -9,10 +9,11 @@ import numpy as np
 
 from ..._input.checked_list import listed
 from ..._input.tensors import stacked
+from ..._input.without_gradient import without_gradient
 from ..._runtime.mixins import SaveMixin
 from ...model.bodies.bodies import BODIES
 from ...model.results.result_lookup import OfOneBody, result_of
-from .equilibrium import Equilibrium
+from .equilibrium import INSTEAD_OF_ENERGIES, Equilibrium
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed
@@ -57,9 +58,10 @@ class EquilibriumSet(SaveMixin, OfOneBody, Sequence[Equilibrium]):
         return stacked([case.displacements for case in self._cases])
 
     @property
-    def energy(self) -> np.ndarray:
+    def energy(self) -> Computed:
         """The potential energies, (k,) J."""
-        return np.array([case.energy for case in self._cases])
+        energies = np.array([case._energy for case in self._cases])
+        return without_gradient(energies, self.positions, "result.energy", INSTEAD_OF_ENERGIES)
 
     @property
     def stable(self) -> bool:
@@ -67,12 +69,12 @@ class EquilibriumSet(SaveMixin, OfOneBody, Sequence[Equilibrium]):
         return all(case.stable for case in self._cases)
 
     @property
-    def largest_membrane_strain(self) -> float:
+    def largest_membrane_strain(self) -> Computed:
         """The largest membrane strain of all cases."""
         return max(case.largest_membrane_strain for case in self._cases)
 
     @property
-    def largest_bending_strain(self) -> float:
+    def largest_bending_strain(self) -> Computed:
         """The largest bending strain of all cases."""
         return max(case.largest_bending_strain for case in self._cases)
 
@@ -89,6 +91,9 @@ class EquilibriumSet(SaveMixin, OfOneBody, Sequence[Equilibrium]):
     def strains(self, index: int = -1) -> Any:
         """Return the strains of one of the cases, by default the last, as `Equilibrium.strains` does."""
         return self._cases[index].strains()
+
+    def _strains(self, index: int = -1) -> Any:
+        return self._cases[index]._strains()
 
     def _values_at(self, index: int):
         return self._cases[index]._values

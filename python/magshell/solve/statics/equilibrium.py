@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._input.tensors import detached, plain_arrays
-from ..._runtime.frozen import immutable
+from ..._input.without_gradient import without_gradient
+from ..._runtime.frozen import FixedDict, immutable
 from ..._runtime.mixins import SaveMixin
-from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.body_contact import BodyContact
 from ...model.contact.contact import Contact
+from ...model.results.crossings import describe_crossings
 from ...model.results.result_lookup import OfOneBody, displacements_of, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.contact_state import ContactState, compute_contact_state
@@ -33,6 +34,12 @@ if TYPE_CHECKING:
     from ...model.solids.solid import Solid
 
 
+# For messages: the energies of a result have no gradients, and these functions have.
+INSTEAD_OF_ENERGIES = (
+    "ms.energy and ms.energies have one, at positions and edge_rotations with the values of the solve"
+)
+
+
 @immutable
 @dataclass(frozen=True, repr=False)
 class Equilibrium(SaveMixin, OfOneBody):
@@ -40,7 +47,6 @@ class Equilibrium(SaveMixin, OfOneBody):
 
     positions: (n_v, 3) m; edge_rotations: (n_e,) rad, zero where an edge has none.
     remanent_magnetization: (n_f, 3) A/m, or None; applied_flux_density: (3,) T, the uniform part.
-    energies: {name of the term: J}.
     stable: whether no direction lowers the energy. n_negative_eigenvalues: the number of directions that do. Under forces
         without potential: the number of growing motions if the scene moved against friction; it may still flutter.
     residual: relative to the forces that cancel in it, and to their round-off. at_roundoff: whether round-off ended the
@@ -49,9 +55,10 @@ class Equilibrium(SaveMixin, OfOneBody):
         number of those where the energy falls equally on both sides, within 1e-6 of its decrease. The solve then took the
         side on which the largest displacement of the mode is positive; `branches` has starts for the other side.
     load_fraction: the share of the change of the load parameters that was reached, 1 unless a solve failed.
-    largest_membrane_strain, largest_bending_strain: the largest magnitudes in `strains`. Beyond 0.2 the material law is not
-        valid, and ms.LargeStrainWarning warns.
     wall_time, linear_time: s, of the whole solve, and of factorizations and back-substitutions. memory: bytes, of the core.
+
+    Where an input was a tensor that requires a gradient, energies, strains, stresses and forces are in torch's graph too,
+    and raise NoGradient if they are differentiated. Copies, pickles and files hold arrays in place of all tensors.
     """
 
     scene: Scene
@@ -59,7 +66,7 @@ class Equilibrium(SaveMixin, OfOneBody):
     edge_rotations: Any
     remanent_magnetization: Any
     applied_flux_density: Any
-    energies: dict[str, float]
+    _energies: dict[str, float] = field(repr=False)
     stable: bool
     n_negative_eigenvalues: int
     iterations: int
@@ -72,8 +79,8 @@ class Equilibrium(SaveMixin, OfOneBody):
     residual: float
     at_roundoff: bool
     load_fraction: float
-    largest_membrane_strain: float
-    largest_bending_strain: float
+    _largest_membrane_strain: float = field(repr=False)
+    _largest_bending_strain: float = field(repr=False)
     wall_time: float
     linear_time: float
     memory: int
@@ -131,9 +138,38 @@ class Equilibrium(SaveMixin, OfOneBody):
         return self._state
 
     @property
-    def energy(self) -> float:
+    def energies(self) -> Computed:
+        """The potential energies of the terms, {name: J}."""
+        energies = FixedDict(self._energies)
+        return without_gradient(energies, self.positions, "result.energies[name]", INSTEAD_OF_ENERGIES)
+
+    @property
+    def energy(self) -> Computed:
         """The potential energy, all terms together, J."""
-        return sum(self.energies.values())
+        return without_gradient(self._energy, self.positions, "result.energy", INSTEAD_OF_ENERGIES)
+
+    @property
+    def _energy(self) -> float:
+        return sum(self._energies.values())
+
+    @property
+    def largest_membrane_strain(self) -> Computed:
+        """The largest magnitude of the membrane strains in `strains`.
+
+        Beyond 0.2 the material law is not valid, and ms.LargeStrainWarning warns.
+        """
+        largest = self._largest_membrane_strain
+        return without_gradient(largest, self.positions, "result.largest_membrane_strain")
+
+    @property
+    def largest_bending_strain(self) -> Computed:
+        """The largest magnitude of the bending strains in `strains`; valid up to 0.2 as well."""
+        largest = self._largest_bending_strain
+        return without_gradient(largest, self.positions, "result.largest_bending_strain")
+
+    @property
+    def _largest_strains(self) -> Largest:
+        return Largest(self._largest_membrane_strain, self._largest_bending_strain)
 
     @property
     def log(self) -> SolveLog:
@@ -165,13 +201,19 @@ class Equilibrium(SaveMixin, OfOneBody):
         >>> rest.strains().membrane[0].round(3)  # (1.1^2 - 1)/2 along, nothing across
         array([0.105, 0.   ])
         """
+        return without_gradient(self._strains(), self.positions, "result.strains()")
+
+    def _strains(self, index: int = -1) -> Any:
         if (solid := self._one_solid()) is not None:
-            return solid.strains()
+            return solid._states()
         with self._values.growth_in_core():
             return strains_of(self.scene, self._state, self._values.all_shells.thickness)
 
     def contact_state(self, contact: BodyContact | Contact) -> ContactState:
         """Return the active pairs of a contact and their forces."""
+        return without_gradient(self._contact_state(contact), self.positions, "result.contact_state(contact)")
+
+    def _contact_state(self, contact: BodyContact | Contact, index: int = -1) -> ContactState:
         return compute_contact_state(self.scene, self._values, contact, self._state)
 
     def reaction(self, support: Pin | Clamp | SymmetryPlane | Periodic) -> Reaction:
@@ -185,17 +227,20 @@ class Equilibrium(SaveMixin, OfOneBody):
         >>> round(float(rest.reaction(clamp).force[2]), 5)  # the weight of 2 g
         0.01962
         """
+        return without_gradient(self._reaction(support), self.positions, "result.reaction(support)")
+
+    def _reaction(self, support: Pin | Clamp | SymmetryPlane | Periodic, index: int = -1) -> Reaction:
         with self._values.in_core():
             held = self.scene._model.held_forces(self._state, self._angle_branches, self._load_parameters)
         return reaction_in(self.scene, support, self._state, held.reshape(-1, 3))
 
-    def magnetic_force(self, body: Shell | Solid | RigidBody | AppliedField) -> np.ndarray:
+    def magnetic_force(self, body: Shell | Solid | RigidBody | AppliedField) -> Computed:
         """Return the magnetic force on a body or on a magnet, (3,) N, as ms.field_of(result).magnetic_force does."""
         return MagneticState(self).magnetic_force(body)
 
     def magnetic_torque(
         self, body: Shell | Solid | RigidBody | AppliedField, center: Numbers | None = None
-    ) -> np.ndarray:
+    ) -> Computed:
         """Return the torque of these forces about `center` (3,) m, by default that of the body, (3,) N m."""
         return MagneticState(self).magnetic_torque(body, center)
 
@@ -210,9 +255,8 @@ class Equilibrium(SaveMixin, OfOneBody):
             kind = "not known to be stable"
         if self.load_fraction < 1.0:
             kind += f", {self.load_fraction:.1%} of the way"
-        energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())
-        strain = Largest(self.largest_membrane_strain, self.largest_bending_strain)
-        crossings = describe_self_intersections(self.scene.mesh, np.asarray(detached(self.positions))[None])
+        energies = ", ".join(f"{name} {value:.4g}" for name, value in self._energies.items())
+        crossings = describe_crossings(self.scene, np.asarray(detached(self.positions))[None])
         extra = f", {self.saddles_escaped} saddles left" if self.saddles_escaped else ""
         tie = (
             "\n  round-off decided how an unstable state was left: result.branches has starts for the other ways, "
@@ -224,9 +268,9 @@ class Equilibrium(SaveMixin, OfOneBody):
         ended = " at round-off" if self.at_roundoff else ""
         return (
             f"Equilibrium: {kind}; largest displacement {moved:.4g} m\n"
-            f"  {describe_strains(self, strain)}\n"
+            f"  {describe_strains(self, self._largest_strains)}\n"
             f"  {crossings}\n"
-            f"  energy {self.energy:.6g} J ({energies})\n"
+            f"  energy {self._energy:.6g} J ({energies})\n"
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.load_steps} load steps{extra}\n"
             f"  {self.log.summary() or 'no step was necessary'}\n"
             f"  residual {self.residual:.1e}{ended}, {self.wall_time:.3g} s, {self.memory / 1e6:.3g} MB, "

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._input.without_gradient import without_gradient
 from ..._runtime.frozen import immutable
 from ...model.results.batch_result import BatchOfPositions
 from .equilibria import EquilibriumSet
+from .equilibrium import INSTEAD_OF_ENERGIES
 
 if TYPE_CHECKING:
+    from ..._input.kinds import Computed
     from ...model.scene.scene import Scene
     from .equilibrium import Equilibrium
 
@@ -45,9 +48,10 @@ class EquilibriumBatch(BatchOfPositions):
     _rest: Any = field(repr=False, default=None)
 
     @property
-    def energy(self) -> np.ndarray:
+    def energy(self) -> Computed:
         """The potential energies, (k,) J; nan for members that failed."""
-        return np.array([np.nan if each is None else each.energy for each in self._members])
+        energies = np.array([np.nan if each is None else each._energy for each in self._members])
+        return without_gradient(energies, self.positions, "result.energy", INSTEAD_OF_ENERGIES)
 
     @property
     def stable(self) -> np.ndarray:

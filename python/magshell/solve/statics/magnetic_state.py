@@ -10,6 +10,7 @@ import numpy as np
 from ... import _core
 from ..._input.quantity import quantity
 from ..._input.tensors import detached
+from ..._input.without_gradient import without_gradient
 from ..._runtime.frozen import Frozen
 from ...model.fields.field import UniformField
 from ...model.fields.magnet_forces import Action, action_between, magnetic_moment_of
@@ -18,7 +19,7 @@ from ...model.scene.own_field import own_field_inputs
 from ...model.scene.own_field_overlap import are_in_solids
 
 if TYPE_CHECKING:
-    from ..._input.kinds import Numbers
+    from ..._input.kinds import Computed, Numbers
     from ...model.fields.field import AppliedField
     from ...model.rigid.rigid import RigidBody
     from ...model.shells.shell import Shell
@@ -106,7 +107,7 @@ class MagneticState(Frozen):
             result.scene._load_parameter_layout.of(result._load_parameters, "scene", "field_factor")[0]
         )
 
-    def magnetic_force(self, body: Shell | Solid | RigidBody | AppliedField) -> np.ndarray:
+    def magnetic_force(self, body: Shell | Solid | RigidBody | AppliedField) -> Computed:
         """Return the magnetic force on a body or on a magnet of the scene, (3,) N.
 
         body: a Shell or Solid, on which the applied field and the other bodies of an OwnField act; a RigidBody or Link with
@@ -129,11 +130,11 @@ class MagneticState(Frozen):
         >>> bool(upper[2] < 0), bool(abs(upper + lower).max() < 1e-12 * abs(upper[2]))
         (True, True)
         """
-        return self._actions(body).forces.sum(axis=0)
+        return self._given_out(self._actions(body).forces.sum(axis=0), "magnetic_force(body)")
 
     def magnetic_torque(
         self, body: Shell | Solid | RigidBody | AppliedField, center: Numbers | None = None
-    ) -> np.ndarray:
+    ) -> Computed:
         """Return the torque of these forces about a point, (3,) N m.
 
         center: (3,) m; None: the mean of the current positions of the body's vertices, the center of a RigidBody's moment,
@@ -143,18 +144,26 @@ class MagneticState(Frozen):
         about = on.center if center is None else quantity("center", "m", center, (3,))
         if about is None:
             raise ValueError(f"center is needed: {body!r:.60} has none of its own")
-        return (np.cross(on.points - about, on.forces) + on.couples).sum(axis=0)
+        torque = (np.cross(on.points - about, on.forces) + on.couples).sum(axis=0)
+        return self._given_out(torque, "magnetic_torque(body)")
 
     @property
-    def energies(self) -> dict[str, float]:
+    def energies(self) -> Computed:
         """The magnetic energies, J: "applied" in the applied fields, that of susceptible shells too, "own" of each shell
         and solid in its own field, "mutual" of the bodies in the fields of each other.
         """
+        return self._given_out(self._energies, "energies[name]")
+
+    @property
+    def _energies(self) -> dict[str, float]:
         result = self.equilibrium
         with result._values.in_core():
             own = float(sum(result.scene._model.own_energies(result._state)))
-        applied = sum(result.energies.get(name, 0.0) for name in _APPLIED)
-        return {"applied": applied, "own": own, "mutual": result.energies.get("own field", 0.0) - own}
+        applied = sum(result._energies.get(name, 0.0) for name in _APPLIED)
+        return {"applied": applied, "own": own, "mutual": result._energies.get("own field", 0.0) - own}
+
+    def _given_out(self, value: Any, name: str) -> Any:
+        return without_gradient(value, self.equilibrium.positions, name)
 
     def _actions(self, body: Any) -> _Actions:
         scene = self.equilibrium.scene
@@ -257,7 +266,7 @@ class MagneticState(Frozen):
             return result.scene._model.magnetic_moments(term, result._state, result._load_parameters)
 
     def __repr__(self) -> str:
-        energies = ", ".join(f"{name} {value:.4g}" for name, value in self.energies.items())
+        energies = ", ".join(f"{name} {value:.4g}" for name, value in self._energies.items())
         return f"MagneticState: energies {energies} J"
 
 

@@ -77,9 +77,9 @@ def find_equilibria(
 
     start: an equilibrium, EquilibriumSet, positions (n_v, 3) m, or a list of these: where to look as well, for saddles too
         if they are asked for.
-    include_unstable: hand back saddles too; `n_negative_eigenvalues` tells them. Their energy over that of a
-        well beside them is
-        what a snap has to be given at least. Deep wells have theirs far away: a `start` that looks like one finds it.
+    include_unstable: hand back saddles too; `n_negative_eigenvalues` tells them. Their energy over that of a well
+        beside them is what a snap has to be given at least. Deep wells have theirs far away: a `start` that looks
+        like one finds it.
     attempts: how many searches are made after the first. One takes from ten to, far from everything, thousands of
         factorizations; `solver` limits it.
     distinct_tolerance: m, the largest distance between two equilibria that count as one, vertex by vertex;
@@ -163,7 +163,7 @@ class _EquilibriumSearch:
                     break
 
     def sorted(self, unstable: bool) -> list[Equilibrium]:
-        return sorted((each for each in self.known if unstable or each.stable), key=lambda each: each.energy)
+        return sorted((each for each in self.known if unstable or each.stable), key=lambda each: each._energy)
 
     def _find(self, start, require_stable: bool = True) -> Equilibrium:
         search = replace(self._search, progress=self._progress(), require_stable=require_stable)
@@ -249,7 +249,7 @@ class _EquilibriumSearch:
                 return False
         self.known.append(found)
         kind = "stable" if found.stable else f"{found.n_negative_eigenvalues} unstable directions"
-        log.info("equilibria: %d found, %s, energy %.6g J", len(self.known), kind, found.energy)
+        log.info("equilibria: %d found, %s, energy %.6g J", len(self.known), kind, found._energy)
         return True
 
     def _points(self, found: Equilibrium) -> np.ndarray:

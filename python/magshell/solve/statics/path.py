@@ -21,8 +21,8 @@ from ..._runtime.progress import SolveBar, stop_at_once
 from ..._runtime.solve_keywords import given_to
 from ..._runtime.solver_entry_point import grouped, solve_entry
 from ...errors import Interrupted, NotConverged
-from ...mesh.triangles.self_intersections import describe_self_intersections
 from ...model.contact.watched_obstacles import watched_obstacles
+from ...model.results.crossings import describe_crossings
 from ...model.results.result_lookup import OfOneBody, result_of
 from ...model.results.solid_result import describe_strains
 from ...model.scene.element_sampling import has_elements
@@ -191,10 +191,17 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
 
         In a scene of one solid, return those of path[solid].
         """
+        return self._strains(index)
+
+    def _strains(self, index: int = -1) -> Any:
         if (solid := self._one_solid()) is not None:
-            return solid.strains(index)
+            return solid._states(index)
         with self._values_at(index).growth_in_core():
             return strains_of(self.scene, self._state_at(index), self._inputs.values.all_shells.thickness)
+
+    @property
+    def _largest_strains(self) -> StrainHistory:
+        return StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
 
     def __getitem__(self, body: Any) -> Any:
         """Return the results of one object of the scene, a row for each point; `equilibrium` returns points."""
@@ -273,9 +280,8 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
             f"  {event.kind} at {event.parameter:.6g}, after point {event.after_point}"
             for event in self.events
         ]
-        strain = StrainHistory(self.largest_membrane_strain, self.largest_bending_strain)
-        lines.append(f"  {describe_strains(self, strain)}")
-        lines.append(f"  {describe_self_intersections(self.scene.mesh, self.positions)}")
+        lines.append(f"  {describe_strains(self, self._largest_strains)}")
+        lines.append(f"  {describe_crossings(self.scene, self.positions)}")
         lines.append(
             f"  {self.iterations} iterations, {self.factorizations} factorizations, {self.wall_time:.3g} s"
         )
@@ -423,7 +429,7 @@ def _follow(
         most = int(np.argmax(bending))
         where = f"the path, at parameter {path.parameters[most]:.4g},"
         warn_of_obtuse_faces(scene, path.positions[most], inputs.values.all_shells, bending[most], where)
-    strain = StrainHistory(path.largest_membrane_strain, path.largest_bending_strain)
+    strain = path._largest_strains
     k = strain.worst
     warn_if_large(path, strain.at(k), f"the path, at point {k}, parameter {path.parameters[k]:.4g}", (k,))
     try:  # Ctrl-C may arrive in a field that is a Python function of the caller

@@ -208,11 +208,9 @@ def solve(
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     positions = scene._model.positions(found.state)
     warn_of_obtuse_faces(
-        scene, positions, inputs.values.all_shells, result.energies.get("bending", 0.0), "this equilibrium"
+        scene, positions, inputs.values.all_shells, result._energies.get("bending", 0.0), "this equilibrium"
     )
-    warn_if_large(
-        result, Largest(result.largest_membrane_strain, result.largest_bending_strain), "the equilibrium"
-    )
+    warn_if_large(result, result._largest_strains, "the equilibrium")
     layout = scene._load_parameter_layout
     field_factor = float(layout.of(found.load_parameters, "scene", "field_factor")[0])
     flux_density = layout.of(found.load_parameters, "scene", "applied_flux_density")[0]
@@ -296,7 +294,7 @@ def _result(
         edge_rotations=edge_rotations,
         remanent_magnetization=inputs.given_magnetization,
         applied_flux_density=_flux_density(inputs, found),
-        energies=dict.fromkeys(scene._model.term_names, np.nan) if energies is None else energies,
+        _energies=dict.fromkeys(scene._model.term_names, np.nan) if energies is None else energies,
         stable=found.stable,
         n_negative_eigenvalues=found.n_negative_eigenvalues,
         iterations=found.iterations,
@@ -309,8 +307,8 @@ def _result(
         residual=found.residual,
         at_roundoff=found.at_roundoff,
         load_fraction=found.load_fraction,
-        largest_membrane_strain=strain.membrane,
-        largest_bending_strain=strain.bending,
+        _largest_membrane_strain=strain.membrane,
+        _largest_bending_strain=strain.bending,
         wall_time=wall_time,
         linear_time=found.linear_time,
         memory=found.bytes,

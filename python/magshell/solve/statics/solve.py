@@ -121,12 +121,11 @@ def equilibrium(
         only. By default such a scene is refused: with friction, where it comes to rest depends on its motion (ms.simulate).
     solver: MixedNewton() by default.
     progress: whether to show a bar once the solve has taken two seconds; or a function, called now and then with the
-    share of
-        the load steps done (0 to 1, of all load cases) and the residual.
-    batch: the number of members k. Any value or load parameter, and `start`, may then have a leading axis of length k;
-    others
-        are the same for all members. The members are solved in parallel threads, each with the same bits as in a single
-        call. The result is an EquilibriumBatch; if a member fails, the others are kept. Gradients use the threads too.
+        share of the load steps done (0 to 1, of all load cases) and the residual.
+    batch: the number of members k. Any value or load parameter, and `start`, may then have a leading axis of length
+        k; others are the same for all members. The members are solved in parallel threads, each with the same bits as
+        in a single call. The result is an EquilibriumBatch; if a member fails, the others are kept. Gradients use the
+        threads too.
     threads: the number of threads of a batch, at most the number of processors that this process may use, which is the
         default. Each thread has a core model of its own.
 

@@ -87,6 +87,32 @@ class WarmStart(Frozen):
         )
         self._members = (None,) * self._batch
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the data of a copy, another process or a file, which continues with the same bits from the last designs."""
+        options = {
+            "start": self._start,
+            "solver": self._search.solver,
+            "batch": self._batch,
+            "threads": self._threads,
+        }
+        is_used = any(each.last is not None for each in self._cases)
+        solves = [each.solves for each in self._cases]
+        return {
+            "scene": self.scene,
+            "options": options,
+            "accepting": self._accepting,
+            "state": self.state_dict() if is_used else None,
+            "solves": solves,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["scene"], **state["options"])
+        if state["state"] is not None:
+            self.load_state_dict(state["state"])
+        for case, solves in zip(self._cases, state["solves"], strict=True):
+            case.solves = solves
+        remember(self, _accepting=state["accepting"])
+
     @property
     def solves(self) -> int:
         """The number of solves so far."""
