@@ -56,7 +56,7 @@ def everything():
     scene = ms.Scene(
         strip,
         supports=[ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 2e-3), rotation=(0, 0.1, 0))],
-        loads=[ms.EdgeLoad(TIP, (0, 0.01, 0.01)), ms.Pressure(strip, 0.5)],
+        loads=[ms.EdgeLoad(TIP, (0, 0.01, 0.01)), ms.Pressure(0.5)],
         field=[magnet, ms.UniformField()],
         gravity=(0, 0, -9.81),
         water=ms.Water(1e3, (0.05, 0, 0), drag_coefficient=1.1, thrust_coefficient=0.3),
@@ -92,8 +92,9 @@ def test_rest_of_a_swinging_strip_falls_with_the_order(integrator):
 @pytest.mark.parametrize("integrator", ORDERS, ids=IDS)
 def test_rest_with_every_kind_of_work_falls_with_the_order(integrator):
     scene, magnet = everything()
-    (energy, _), (finer, _) = rests(scene, integrator, 100, **changing(magnet))
-    assert finer < energy / (0.7 * 2 ** ORDERS[integrator])
+    (energy, _), (finer, _) = rests(scene, integrator, 200, **changing(magnet))
+    # The stiff membrane, whose waves these steps do not resolve, leaves SDIRK3 the second order.
+    assert finer < energy / (0.8 * 2 ** min(ORDERS[integrator], 2))
 
 
 def test_rows_of_a_scene_with_every_kind_of_work():
@@ -237,7 +238,7 @@ def path_balance(**options):
     scene = ms.Scene(
         strip,
         supports=[ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 2e-3), rotation=(0, 0.3, 0))],
-        loads=[ms.EdgeLoad(TIP, (0, 0.01, 0.01)), ms.Pressure(strip, 0.5)],
+        loads=[ms.EdgeLoad(TIP, (0, 0.01, 0.01)), ms.Pressure(0.5)],
         field=ms.UniformField(),
         gravity=(0, 0, -9.81),
     )

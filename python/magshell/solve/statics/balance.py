@@ -64,7 +64,7 @@ def term_kinds(scene: Scene) -> list[TermKind]:
     bodies, kinds = scene._bodies, []
     places = {id(body): k for k, body in enumerate(scene.bodies)}
     deformable = {
-        bodies.core_number(span): f"elastic, body {places[id(body)]}"
+        bodies.core_number(span, len(bodies.skins)): f"elastic, body {places[id(body)]}"
         for span, body in zip(bodies.spans, bodies.deformable, strict=True)
     }
     for name, body, has_no_potential in _core.kinds_of_terms(scene._model):
