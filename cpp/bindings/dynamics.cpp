@@ -530,13 +530,14 @@ void register_dynamics(py::module_& module) {
     module.def("term_gradients", &term_gradients, py::arg("model"), py::arg("q"), py::arg("angle_branches"),
                py::arg("load_parameters"),
                "The gradient of each term of the energy by all unknowns, (terms, n).");
-    module.def("motion_balance", &balance_of, py::arg("model"), py::arg("input"), py::arg("substeps"),
-               py::arg("steps_done"), py::arg("progress") = py::none(),
-               "The sums of a motion until each recorded state, which is repeated for them: work and impulses "
-               "of all forces (n, rows, 7), energies of the terms and of the Maxwell branches, work of "
-               "parameters "
-               "that change, kinetic energy and momenta (n, 7); the last state; the names of the terms "
-               "without energy.");
+    module.def(
+        "motion_balance", &balance_of, py::arg("model"), py::arg("input"), py::arg("substeps"),
+        py::arg("steps_done"), py::arg("progress") = py::none(),
+        "The sums of a motion until each recorded state, which is repeated for them: work and impulses "
+        "of all forces (n, rows, 7), energies of the terms and of the Maxwell branches, work of "
+        "parameters "
+        "that change, kinetic energy and momenta (n, 7); the last state; the names of the terms "
+        "without energy.");
     module.def("push_forward_motion", &forward, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("values"), py::arg("along"), py::arg("progress") = py::none(),
                "The derivatives of positions, edge rotations, velocities and motor forces of recorded states "

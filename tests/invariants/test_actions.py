@@ -11,7 +11,17 @@ import magshell as ms
 from magshell import _core
 
 # Terms between parts of a scene; others act from the ground, a field or an obstacle.
-INTERNAL = ("membrane", "bending", "solid", "creases", "muscle", "own field", "body contact", "volume", "tendons")
+INTERNAL = (
+    "membrane",
+    "bending",
+    "solid",
+    "creases",
+    "muscle",
+    "own field",
+    "body contact",
+    "volume",
+    "tendons",
+)
 
 
 @cache
@@ -27,7 +37,10 @@ def test_internal_forces_and_torques_cancel(name):
     scene, model = move.scene, move.scene._model
     # Internal forces depend on no load parameter but the factor of actuators.
     layout = scene._load_parameter_layout
-    loaded = layout.packed({("scene", name): 1.0 for name in ("load_factor", "own_field_factor") if ("scene", name) in layout}, layout.zeros())
+    loaded = layout.packed(
+        {("scene", name): 1.0 for name in ("load_factor", "own_field_factor") if ("scene", name) in layout},
+        layout.zeros(),
+    )
     with move._conditions.inputs.in_core():
         gradients = _core.term_gradients(model, move.end.state, move.end.angle_branches, loaded)
         terms = [kind for kind, _, _ in _core.kinds_of_terms(model)]
@@ -61,7 +74,9 @@ def test_linear_responses_are_reciprocal(name):
     scene = made.scene()
     forces = 1e-3 * np.array([(0.3, -0.5, 1.0), (-0.2, 0.7, 0.4)])
     answers = [
-        ms.linear_response(scene, field_factor=0.0, support_factor=0.0, values={pull: {"force": force}})[body].displacements
+        ms.linear_response(scene, field_factor=0.0, support_factor=0.0, values={pull: {"force": force}})[
+            body
+        ].displacements
         for pull, force in zip(pulls, forces, strict=True)
     ]
     there, back = answers[0][at[1]] @ forces[1], answers[1][at[0]] @ forces[0]

@@ -59,7 +59,8 @@ def test_scenes_move_alike_in_another_frame_by_every_integrator(integrator, fram
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in FEATURES if name not in ("magnetized", "solid", "attracting", "with_added_mass")]
+    "name",
+    [name for name in FEATURES if name not in ("magnetized", "solid", "attracting", "with_added_mass")],
 )
 def test_scene_moves_alike_beside_itself(name):
     away = np.array((1.0, 2.0, 3.0))

@@ -18,7 +18,8 @@ EXACT = {"solver": ms.MixedNewton(tolerance=1e-12), "progress": False}
 
 def sheet(**options):
     return ms.Shell(
-        MESH, **{"thickness": 5e-4, "young_modulus": 5e5, "poisson_ratio": 0.4, "mass_density": 1e3, **options}
+        MESH,
+        **{"thickness": 5e-4, "young_modulus": 5e5, "poisson_ratio": 0.4, "mass_density": 1e3, **options},
     )
 
 
@@ -74,7 +75,9 @@ def changing(magnet):
         "applied_flux_density": lambda t: 2e-3 * np.array([0, 0, smooth(t)]),
         "support_factor": smooth,
         "load_factor": smooth,
-        "values": {magnet: {"center": lambda t: np.array([0.03, 0.01 * smooth(t), -0.06 + 0.02 * smooth(t)])}},
+        "values": {
+            magnet: {"center": lambda t: np.array([0.03, 0.01 * smooth(t), -0.06 + 0.02 * smooth(t)])}
+        },
         "damping": 1e-5,
         "stiffness_damping": 1e-4,
         "maxwell_modulus": [0.3, 0.2],
@@ -103,7 +106,9 @@ def test_rows_of_a_scene_with_every_kind_of_work():
     assert set(found.energies) == {"kinetic", "elastic", "magnetic", "gravity", "Maxwell branches"}
     assert set(found.work) == {"loads", "pressures", "supports", "moving fields"}
     assert set(found.dissipation) == {"damping", "stiffness damping", "Maxwell branches", "water"}
-    assert {"supports", "gravity", "magnetic", "loads", "pressures", "water", "damping"} == set(found.impulses)
+    assert {"supports", "gravity", "magnetic", "loads", "pressures", "water", "damping"} == set(
+        found.impulses
+    )
     for name in ("damping", "stiffness damping", "Maxwell branches"):
         assert (np.diff(found.dissipation[name]) >= 0.0).all()
     assert found.rest_fraction < 1e-3
@@ -114,11 +119,15 @@ def test_free_fall_has_the_impulse_and_the_work_of_gravity(integrator):
     scene = ms.Scene(sheet(), gravity=(0, 0, -9.81), allow_rigid_motions=True)
     found = moved(scene, integrator, 20, velocities=(0.1, 0.2, 0.5))
     mass = 1e3 * 5e-4 * 0.03 * 0.01
-    np.testing.assert_allclose(found.impulses["gravity"][:, 2], -9.81 * mass * found.times, rtol=1e-9, atol=1e-18)
+    np.testing.assert_allclose(
+        found.impulses["gravity"][:, 2], -9.81 * mass * found.times, rtol=1e-9, atol=1e-18
+    )
     np.testing.assert_allclose(found.momentum[0], mass * np.array([0.1, 0.2, 0.5]), rtol=1e-12)
     fallen = 0.5 * found.times - 0.5 * 9.81 * found.times**2
     if ORDERS[integrator] > 1:  # exact for a constant force
-        np.testing.assert_allclose(found.energies["gravity"] - found.energies["gravity"][0], 9.81 * mass * fallen, atol=1e-12)
+        np.testing.assert_allclose(
+            found.energies["gravity"] - found.energies["gravity"][0], 9.81 * mass * fallen, atol=1e-12
+        )
         assert found.rest_fraction < 1e-9
 
 
@@ -161,8 +170,14 @@ def test_block_that_slides_loses_its_energy_to_friction(implicit):
 
 
 def test_impulses_of_two_sheets_that_meet_cancel():
-    lower, upper = sheet(), ms.Shell(
-        MESH.transformed(translation=(1e-3, 1e-3, 1e-3)), thickness=5e-4, young_modulus=5e5, mass_density=1e3
+    lower, upper = (
+        sheet(),
+        ms.Shell(
+            MESH.transformed(translation=(1e-3, 1e-3, 1e-3)),
+            thickness=5e-4,
+            young_modulus=5e5,
+            mass_density=1e3,
+        ),
     )
     scene = ms.Scene([lower, upper], contacts=[ms.Contact(lower, upper)], allow_rigid_motions=True)
     velocities = np.repeat([(0, 0, 0.1), (0, 0, -0.1)], MESH.n_vertices, axis=0)
@@ -176,7 +191,9 @@ def test_impulses_of_two_sheets_that_meet_cancel():
 def test_substeps_and_chosen_steps_are_balanced():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ms.StepErrorWarning)
-        move = ms.simulate(swinging(), steps=8, time_step=ms.Adaptive(5e-3, tolerance=1e-6), record_every=2, **EXACT)
+        move = ms.simulate(
+            swinging(), steps=8, time_step=ms.Adaptive(5e-3, tolerance=1e-6), record_every=2, **EXACT
+        )
     found = move.balance()
     assert len(move.time_steps) > 8
     np.testing.assert_array_equal(found.times, move.times)

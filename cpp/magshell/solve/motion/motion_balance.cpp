@@ -83,7 +83,8 @@ class Accountant {
         model_.linearize(q);
     }
     // Adds a force on all dofs to a row, for nodes at q that move with v.
-    void add_force(const VectorXd& force, const VectorXd& q, const VectorXd& v, Index row, BalanceRows& to) const;
+    void add_force(const VectorXd& force, const VectorXd& q, const VectorXd& v, Index row,
+                   BalanceRows& to) const;
     // Returns the motions of all nodes in three translations and three rotations about the axes; directions only rotate.
     std::array<VectorXd, 6> rigid_motions(const VectorXd& q) const;
     // Returns the parts of a motion that constraints prescribe: on nodes of rigid bodies, and on all others.
@@ -117,7 +118,8 @@ class Accountant {
     std::vector<char> is_rigid_;
     BalanceRows sums_;
     VectorXd driven_;
-    Rates last_;  // at the end of the last step, with which a method that begins explicitly goes on; empty before
+    Rates
+        last_;  // at the end of the last step, with which a method that begins explicitly goes on; empty before
 };
 
 void Accountant::add_force(const VectorXd& force, const VectorXd& q, const VectorXd& v, Index row,
@@ -224,7 +226,8 @@ void Accountant::add_viscous(const Instant& at, const StrainRates& elastic, cons
         for (std::size_t k = 0; k < law.branches.size(); ++k) {
             // With e' = (d - e)/tau
             const StrainSet stress = terms.stresses(elastic.e[k].times(law.branches[k].time));
-            to.forces(further(MotionBalance::maxwell), 0) -= law.branches[k].modulus * stress.dot(elastic.e[k]);
+            to.forces(further(MotionBalance::maxwell), 0) -=
+                law.branches[k].modulus * stress.dot(elastic.e[k]);
             sum.add(law.branches[k].modulus, stress);
         }
         to.reactions += terms.forces(sum, at.q.size());
@@ -392,14 +395,13 @@ void Accountant::add(const StepAlgebra& step, const SubstepRecord& record, const
         const double T = step.stage_time();
         const StageState& stage = record.stages.back();
         const VectorXd mean = 0.5 * (begin.v + at.all.back().v);
-        const Rates found =
-            contact_rates({stage.q,
-                           stage.angle_branches,
-                           load_parameters.back(),
-                           at.all.back().v,
-                           at.all.back().acceleration,
-                           {&at.x_hat.back(), &at.v_hat.back(), T}},
-                          mean, stage.contact);
+        const Rates found = contact_rates({stage.q,
+                                           stage.angle_branches,
+                                           load_parameters.back(),
+                                           at.all.back().v,
+                                           at.all.back().acceleration,
+                                           {&at.x_hat.back(), &at.v_hat.back(), T}},
+                                          mean, stage.contact);
         sums_ += step.dt() * found.forces;
         add_driven(stage.q, stage.angle_branches, load_parameters.back(),
                    load_parameters.back() - load_parameters.front(), found.reactions, true, false);

@@ -35,7 +35,17 @@ struct MotionBalance {
 
     /// Forces that are no terms: those of damping, of the two kinds of viscosity, of dampers, of supports, of the ground on joints, of
     /// motors, and what is left over of all on the free unknowns (of hard contact, if that is how contact is solved).
-    enum FurtherForce { damping, stiffness_damping, maxwell, dampers, supports, joints, motors, left_over, further_forces };
+    enum FurtherForce {
+        damping,
+        stiffness_damping,
+        maxwell,
+        dampers,
+        supports,
+        joints,
+        motors,
+        left_over,
+        further_forces
+    };
 
     std::vector<State> states;  // recorded
     VectorXd last;              // the state at the end

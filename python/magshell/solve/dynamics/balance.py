@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -53,9 +53,9 @@ class MotionBalance(EnergyBalance):
     """The balance of energy, momentum and angular momentum of a motion, in its n recorded states.
 
     parameters: (n,) s, the times. momentum: (n, 3) N s; angular_momentum: (n, 3) N m s, about the origin. impulses,
-    angular_impulses: {name: (n, 3)}, of supports, loads, fields, contact with obstacles and other forces from outside since the
-    first state. Forces between the parts of a scene have none, so that `momentum_rest` and `angular_momentum_rest` show it if
-    they do not cancel.
+    angular_impulses: {name: (n, 3)}, of supports, loads, fields, contact with obstacles and other forces from outside
+    since the first state. Forces between the parts of a scene have none, so that `momentum_rest` and
+    `angular_momentum_rest` show it if they do not cancel.
 
     The sums are those that the integrator itself would give for the work and the impulses as further unknowns, so each has
     its order. The momentum is balanced up to the tolerance of the solver.
@@ -89,7 +89,11 @@ class MotionBalance(EnergyBalance):
     def angular_momentum_rest(self) -> np.ndarray:
         """The change of the angular momentum without an angular impulse, (n, 3) N m s: the error of the steps, or of forces
         between parts of the scene."""
-        return self.angular_momentum - self.angular_momentum[0] - sum(self.angular_impulses.values(), np.zeros(3))
+        return (
+            self.angular_momentum
+            - self.angular_momentum[0]
+            - sum(self.angular_impulses.values(), np.zeros(3))
+        )
 
     def _columns(self) -> dict[str, np.ndarray]:
         columns = super()._columns()
@@ -117,7 +121,11 @@ class MotionBalance(EnergyBalance):
         lines = super()._lines()
         for unit, what, total, impulses, rest in self._vectors():
             lines.append(f"  change of the {what} [{unit}]")
-            rows = {"all": total - total[0], **{f"by {name}": row for name, row in impulses.items()}, "rest": rest}
+            rows = {
+                "all": total - total[0],
+                **{f"by {name}": row for name, row in impulses.items()},
+                "rest": rest,
+            }
             for name, row in rows.items():
                 lines.append(f"    {name:<36}" + "".join(f"{each:+12.4g}" for each in row[-1]))
         return lines
@@ -196,13 +204,14 @@ def _check_repeated(move: Trajectory, last: np.ndarray) -> None:
     if difference > _SAME * size:
         raise RuntimeError(
             f"the steps of the motion could not be repeated exactly: the end differs by {difference:.3g} m. The motion is so "
-            "sensitive to round-off that its balance would be that of another motion: take shorter steps, or record a part"
+            "sensitive to round-off that this would be the balance of another motion: take shorter steps, or balance a part"
         )
 
 
 def rest_of_energy(move: Trajectory) -> EnergyBalance | None:
-    """Return the balance of energy of a motion in which no force puts energy in or takes it out: all of its energies, as the
-    recorded states have them. None for another motion, of which only its balance knows the rest.
+    """Return the balance of energy of a motion in which no force puts energy in or takes it out.
+
+    It has the energies of the recorded states. Returns None for another motion, of which only its balance knows the rest.
     """
     if not move._keeps_energy:
         return None

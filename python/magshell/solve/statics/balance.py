@@ -140,7 +140,7 @@ class EnergyBalance:
         return float(np.abs(self.rest).max()) / moved if moved > 0.0 else 0.0
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the balance as a pandas.DataFrame (needs the package pandas): a row for each state, units in the names of columns.
+        """Return the balance as a pandas.DataFrame, a row for each state, with units in the names of its columns.
 
         Raises ImportError without pandas.
         """
@@ -172,7 +172,9 @@ class EnergyBalance:
             ("lost to", self.dissipation),
         ):
             lines += [f"  {head}"] * bool(rows)
-            lines += [f"    {name:<36}{row[-1] - row[0]:+12.4g}{np.ptp(row):12.4g}" for name, row in rows.items()]
+            lines += [
+                f"    {name:<36}{row[-1] - row[0]:+12.4g}{np.ptp(row):12.4g}" for name, row in rows.items()
+            ]
         lines.append(f"  {'rest':<38}{rest[-1]:+12.4g}{np.ptp(rest):12.4g}")
         lines.append(f"  {describe_rest(self)}")
         return lines
