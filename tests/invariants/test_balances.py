@@ -10,9 +10,12 @@ from framed_scenes import INTEGRATORS, PAIRS, build, names, orders_of
 import magshell as ms
 
 OTHERS = [each for each in INTEGRATORS if each != "TRBDF2"]
-DURATION, STEPS = 2e-3, 80  # s; the shortest waves of the sheets take 0.3 ms
+DURATION = 4e-3  # s
+STEPS = {
+    "ImplicitEuler": 640
+}  # of 6 us; of the other methods 80 of 50 us. The shortest waves of the sheets take 0.3 ms.
 FLOOR = 1e-8  # of what moved: the tolerance of the solver, over all steps
-BELOW_ORDER = 0.4  # how much less the order seen may be, at steps that are not infinitely short
+BELOW_ORDER = 0.5  # how much less the order seen may be, at steps that are not infinitely short
 # What is not held, {(what, scene): why}. These tests fail when it is held, so that the table is kept true.
 BEING_MENDED = {
     ("energy", "with_added_mass"): "added mass has no energy (DESIGN 2.19)",
@@ -31,14 +34,19 @@ def balance(name: str, integrator: str, steps: int) -> ms.MotionBalance:
 
 def momentum_rest(name: str, integrator: str) -> float:
     """Return the change of the momentum that no impulse explains, over the momentum."""
-    found = balance(name, integrator, STEPS)
+    found = balance(name, integrator, STEPS.get(integrator, 80))
     size = max(np.abs(each).max() for each in (found.momentum, *found.impulses.values()))
     return float(np.abs(found.momentum_rest).max() / size)
 
 
+def _steps(integrator: str) -> tuple[int, int]:
+    steps = STEPS.get(integrator, 80)
+    return steps, 2 * steps
+
+
 def order(what: str, name: str, integrator: str) -> float:
     """Return the order with which the rest of the energy or the angular momentum falls; inf where it is round-off."""
-    coarse, fine = (balance(name, integrator, steps) for steps in (STEPS, 2 * STEPS))
+    coarse, fine = (balance(name, integrator, steps) for steps in _steps(integrator))
     if what == "energy":
         before, after, size = coarse.rest, fine.rest, fine.moved
     else:

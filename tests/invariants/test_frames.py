@@ -5,7 +5,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from framed_scenes import EXTENT, FEATURES, INTEGRATORS, OBLIQUE, PAIRS, Frame, build, names
+from framed_scenes import EXTENT, FEATURES, INTEGRATORS, OBLIQUE, PAIRS, build, names
+from frames import Frame
 
 import magshell as ms
 

@@ -8,7 +8,7 @@ import pytest
 from framed_scenes import EXTENT, INTEGRATORS, build, names, orders_of
 
 OTHERS = [each for each in INTEGRATORS if each != "TRBDF2"]
-DURATION, STEPS = 2e-3, 80  # s
+DURATION, STEPS = 4e-3, 80  # s
 FLOOR = 1e-9  # of the extent
 
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "magshell/scene/term_forces.h"
 #include "magshell/solve/globalization/obstacle_sides.h"
 
 namespace magshell {
@@ -39,10 +40,9 @@ class Accountant {
         : model_(model),
           input_(input),
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
-          terms_(static_cast<Index>(model.terms().energies.size())),
-          forces_(static_cast<Index>(model.terms().forces.size())) {
-        sums_ = BalanceRows::Zero(terms_ + forces_ + MotionBalance::further_forces, 7);
-        driven_ = VectorXd::Zero(terms_);
+          terms_(model) {
+        sums_ = BalanceRows::Zero(terms_.rows() + MotionBalance::further_forces, 7);
+        driven_ = VectorXd::Zero(terms_.energies());
         is_rigid_.assign(model.nodes().n_nodes(), 0);
         for (const std::vector<Index>& body : model.bodies().rigid_nodes())
             for (const Index node : body) is_rigid_[node] = 1;
@@ -72,10 +72,7 @@ class Accountant {
         StageMotion motion;
     };
 
-    Index further(MotionBalance::FurtherForce kind) const { return terms_ + forces_ + kind; }
-    bool is_contact(std::string_view name) const {
-        return name == "contact" || name == "body contact" || name == "friction" || name == "body friction";
-    }
+    Index further(MotionBalance::FurtherForce kind) const { return terms_.rows() + kind; }
     void set_state(const VectorXd& q, const Model::AngleBranches& angle_branches,
                    const LoadParameters& load_parameters) {
         model_.set_angle_branches(angle_branches);
@@ -114,7 +111,7 @@ class Accountant {
     Model& model_;
     const MotionInput& input_;
     Stepper stepper_;
-    const Index terms_, forces_;
+    const TermForces terms_;
     std::vector<char> is_rigid_;
     BalanceRows sums_;
     VectorXd driven_;
@@ -250,23 +247,11 @@ Accountant::Rates Accountant::rates(const Instant& at, bool implicit_contact, co
     Rates found{BalanceRows::Zero(sums_.rows(), 7), inertial + damped};
     set_state(at.q, at.angle_branches, at.load_parameters);
     add_force(-damped, at.q, at.v, further(MotionBalance::damping), found.forces);
-    Residual out;
-    const SceneTerms& terms = model_.terms();
-    for (Index k = 0; k < terms_; ++k) {
-        out.reset(model_.size());
-        terms.energies[k]->evaluate(at.q.data(), at.load_parameters, out);
-        if (implicit_contact && is_contact(terms.energies[k]->name())) continue;
-        add_force(-out.gradient, at.q, at.v, k, found.forces);
-        found.reactions += out.gradient;
-    }
-    if (forces_ > 0) model_.evaluate_forces(at.q, at.load_parameters, at.motion);
-    for (Index k = 0; k < forces_; ++k) {
-        if (implicit_contact && is_contact(terms.forces[k]->name())) continue;
-        out.reset(model_.size());
-        terms.forces[k]->evaluate(model_.kinematics(), at.load_parameters, out);
-        add_force(-out.gradient, at.q, at.v, terms_ + k, found.forces);
-        found.reactions += out.gradient;
-    }
+    terms_.each(at.q, at.load_parameters, at.motion, [&](Index row, const VectorXd& gradient) {
+        if (implicit_contact && terms_.is_contact(row)) return;
+        add_force(-gradient, at.q, at.v, row, found.forces);
+        found.reactions += gradient;
+    });
     add_viscous(at, elastic, joints, found);
     add_reactions(found.reactions, inertial, at.q, at.v, found.forces);
     return found;
@@ -276,23 +261,11 @@ Accountant::Rates Accountant::contact_rates(const Instant& at, const VectorXd& m
                                             const VectorXd& by_contact) {
     Rates found{BalanceRows::Zero(sums_.rows(), 7), input_.inertia.mass.cwiseProduct(by_contact)};
     set_state(at.q, at.angle_branches, at.load_parameters);
-    const SceneTerms& terms = model_.terms();
-    Residual out;
-    for (Index k = 0; k < terms_; ++k) {
-        if (!is_contact(terms.energies[k]->name())) continue;
-        out.reset(model_.size());
-        terms.energies[k]->evaluate(at.q.data(), at.load_parameters, out);
-        add_force(-out.gradient, at.q, mean_velocity, k, found.forces);
-        found.reactions += out.gradient;
-    }
-    if (forces_ > 0) model_.evaluate_forces(at.q, at.load_parameters, at.motion);
-    for (Index k = 0; k < forces_; ++k) {
-        if (!is_contact(terms.forces[k]->name())) continue;
-        out.reset(model_.size());
-        terms.forces[k]->evaluate(model_.kinematics(), at.load_parameters, out);
-        add_force(-out.gradient, at.q, mean_velocity, terms_ + k, found.forces);
-        found.reactions += out.gradient;
-    }
+    terms_.each(at.q, at.load_parameters, at.motion, [&](Index row, const VectorXd& gradient) {
+        if (!terms_.is_contact(row)) return;
+        add_force(-gradient, at.q, mean_velocity, row, found.forces);
+        found.reactions += gradient;
+    });
     add_reactions(found.reactions, {}, at.q, mean_velocity, found.forces);
     return found;
 }
@@ -302,15 +275,11 @@ void Accountant::add_driven(const VectorXd& q, const Model::AngleBranches& angle
                             const VectorXd& reactions, bool contact, bool others) {
     if (change.isZero(0.0)) return;
     model_.set_angle_branches(angle_branches);
-    const SceneTerms& terms = model_.terms();
     const auto energies = [&](double factor) {
         const LoadParameters there = load_parameters + factor * change;
         model_.parameters().set_time_varying(there);
-        VectorXd found = VectorXd::Zero(terms_);
-        for (Index k = 0; k < terms_; ++k)
-            if (is_contact(terms.energies[k]->name()) ? contact : others)
-                found[k] = terms.energies[k]->energy(q.data(), there);
-        return found;
+        return terms_.energies_at(q, there,
+                                  [&](Index row) { return terms_.is_contact(row) ? contact : others; });
     };
     driven_ += (energies(difference) - energies(-difference)) / (2.0 * difference);
     model_.parameters().set_time_varying(load_parameters);
@@ -380,7 +349,9 @@ void Accountant::add(const StepAlgebra& step, const SubstepRecord& record, const
         const Model::AngleBranches& branches =
             begins ? begin.angle_branches : record.stages[point - 1].angle_branches;
         const VectorXd &v = at.all[j].v, &acceleration = at.all[j].acceleration;
-        if (!begins || last_.reactions.size() == 0) {
+        // Free bodies begin with other rates than those at the end of the step before (FreeFlight::finish).
+        const bool is_known = begins && last_.reactions.size() > 0 && stepper_.free_bodies().empty();
+        if (!is_known) {
             const double T = step.stage_time();
             const VectorXd x_hat = begins ? VectorXd(q - T * v) : at.x_hat[point - 1],
                            v_hat = begins ? VectorXd(v - T * acceleration) : at.v_hat[point - 1];
@@ -418,7 +389,7 @@ MotionBalance::State Accountant::state(const MotionState& at, const LoadParamete
     found.driven = driven_;
     set_state(at.q, at.angle_branches, load_parameters);
     const std::size_t branches = input_.viscosity.branches.size();
-    found.energies = VectorXd::Zero(terms_ + static_cast<Index>(branches));
+    found.energies = VectorXd::Zero(terms_.energies() + static_cast<Index>(branches));
     Index row = 0;
     for (const auto& [name, energy] : model_.energies(at.q, load_parameters)) found.energies[row++] = energy;
     if (branches > 0 && !at.e.empty()) {

@@ -203,8 +203,8 @@ def _check_repeated(move: Trajectory, last: np.ndarray) -> None:
     size = np.abs(move.end.state).max(initial=0.0)
     if difference > _SAME * size:
         raise RuntimeError(
-            f"the steps of the motion could not be repeated exactly: the end differs by {difference:.3g} m. The motion is so "
-            "sensitive to round-off that this would be the balance of another motion: take shorter steps, or balance a part"
+            f"the steps of the motion could not be repeated exactly: the end differs by {difference:.3g} m. The motion is so"
+            " sensitive to round-off that this would be the balance of another motion: take shorter steps, or balance a part"
         )
 
 
@@ -239,7 +239,12 @@ def _warn_of_rest(move: Trajectory, balance: EnergyBalance) -> None:
     """Warn of a rest that is large, unless the errors of the steps have been warned of."""
     if not balance.rest_fraction > LARGEST_REST or move.scene._warned_of_steps or move.scene._warned_of_gains:
         return
+    # One digit: Python shows a warning once for each place and text, so that a loop over motions does not repeat it.
+    worst = balance.rest[np.argmax(np.abs(balance.rest))]
+    what = f"{'made' if worst > 0.0 else 'lost'} {100.0 * balance.rest_fraction:.1g} %"
     warning = StepErrorWarning(
-        f"{describe_rest(balance)}. Take shorter steps; print(motion.balance()) has the rows.", move
+        f"the steps of the motion {what} of the largest energy that moved. Take shorter steps; print(motion.balance()) says "
+        "where the energy went",
+        move,
     )
     warnings.warn(warning, stacklevel=callers_level())
