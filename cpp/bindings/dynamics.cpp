@@ -12,6 +12,7 @@
 #include "magshell/adjoint/dynamic.h"
 #include "magshell/adjoint/motion_tangent.h"
 #include "magshell/core/errors.h"
+#include "magshell/solve/motion/motion_balance.h"
 
 namespace magshell::bindings {
 namespace {
@@ -372,6 +373,67 @@ py::tuple run_with_tangent(Model& model, const MotionInput& input, std::size_t b
     return py::make_tuple(std::move(found.motion), tangents, found.refusal);
 }
 
+// Returns for each term of the energy its name, its body or -1, and whether it has no potential.
+py::list kinds_of_terms(const Model& model) {
+    py::list kinds;
+    for (const std::unique_ptr<Term>& term : model.terms().energies)
+        kinds.append(py::make_tuple(py::str(term->name().data(), term->name().size()), term->body(),
+                                    term->capabilities().has_unsymmetric_tangent));
+    return kinds;
+}
+
+// Returns the gradient of each term of the energy by all unknowns, (terms, unknowns).
+Knots term_gradients(Model& model, const VectorXd& q, const Model::AngleBranches& angle_branches,
+                     const LoadParameters& load_parameters) {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard lock(model.in_use());
+    model.set_angle_branches(angle_branches);
+    model.linearize(q);
+    Knots rows(model.terms().energies.size(), model.size());
+    Residual of_term;
+    Eigen::Index row = 0;
+    for (const std::unique_ptr<Term>& term : model.terms().energies) {
+        of_term.reset(model.size());
+        term->evaluate(q.data(), load_parameters, of_term);
+        rows.row(row++) = of_term.gradient.transpose();
+    }
+    return rows;
+}
+
+// Returns the recorded states of a balance: sums of forces (n, rows, 7), energies (n, terms and Maxwell branches), work by parameters that
+// change (n, terms), kinetic energies and momenta (n, 7); the state at the end; and the names of the terms without energy.
+py::tuple balance_of(Model& model, const MotionInput& input,
+                     const std::map<Index, std::vector<std::tuple<double, double, bool>>>& given,
+                     Index steps_done, const py::object& progress) {
+    const Watch watch(progress);
+    std::map<Index, Substeps> substeps;
+    for (const auto& [step, parts] : given)
+        for (const auto& [begin, end, dissipative] : parts)
+            substeps[step].push_back({begin, end, dissipative});
+    MotionBalance balance;
+    {
+        const py::gil_scoped_release unlocked;
+        const std::lock_guard lock(model.in_use());
+        balance = motion_balance(model, input, substeps, steps_done,
+                                 [&](double at, double residual) { watch(at, residual); });
+    }
+    const py::ssize_t n = static_cast<py::ssize_t>(balance.states.size());
+    const MotionBalance::State& first = balance.states.front();
+    Array forces({n, static_cast<py::ssize_t>(first.forces.rows()), py::ssize_t{7}});
+    Knots energies(n, first.energies.size()), driven(n, first.driven.size()), momenta(n, 7);
+    for (py::ssize_t k = 0; k < n; ++k) {
+        const MotionBalance::State& state = balance.states[k];
+        Eigen::Map<MotionBalance::Rows>(forces.mutable_data(k, 0, 0), state.forces.rows(), 7) = state.forces;
+        energies.row(k) = state.energies.transpose();
+        driven.row(k) = state.driven.transpose();
+        momenta.row(k) << state.kinetic, state.momenta.transpose();
+    }
+    py::list names;
+    for (const std::unique_ptr<ForceTerm>& force : model.terms().forces)
+        names.append(py::str(force->name().data(), force->name().size()));
+    return py::make_tuple(forces, energies, driven, momenta, balance.last, names);
+}
+
 }  // namespace
 
 void register_dynamics(py::module_& module) {
@@ -456,6 +518,26 @@ void register_dynamics(py::module_& module) {
                py::arg("by_positions"), py::arg("by_edge_rotations"), py::arg("by_velocities"),
                py::arg("by_driving") = Knots(), py::arg("by_rest") = false, py::arg("stages") = false,
                py::arg("progress") = py::none());
+    module.def("kinds_of_terms", &kinds_of_terms, py::arg("model"),
+               "(name, number of the body or -1, whether it has no potential) of each term of the energy.");
+    module.def(
+        "keeps_energy",
+        [](const Model& model) {
+            const Capabilities& has = model.capabilities();
+            return !has.has_velocity_forces && !has.has_own_viscosity && !has.has_unsymmetric_tangent;
+        },
+        py::arg("model"), "Whether all forces of the scene, without damping, have a potential.");
+    module.def("term_gradients", &term_gradients, py::arg("model"), py::arg("q"), py::arg("angle_branches"),
+               py::arg("load_parameters"),
+               "The gradient of each term of the energy by all unknowns, (terms, n).");
+    module.def(
+        "motion_balance", &balance_of, py::arg("model"), py::arg("input"), py::arg("substeps"),
+        py::arg("steps_done"), py::arg("progress") = py::none(),
+        "The sums of a motion until each recorded state, which is repeated for them: work and impulses "
+        "of all forces (n, rows, 7), energies of the terms and of the Maxwell branches, work of "
+        "parameters "
+        "that change, kinetic energy and momenta (n, 7); the last state; the names of the terms "
+        "without energy.");
     module.def("push_forward_motion", &forward, py::arg("model"), py::arg("input"), py::arg("motion"),
                py::arg("values"), py::arg("along"), py::arg("progress") = py::none(),
                "The derivatives of positions, edge rotations, velocities and motor forces of recorded states "

@@ -133,6 +133,7 @@ from .output.results.surface_files import write_surface
 from .output.results.tables import to_pandas, to_xarray
 from .solve.accuracy.error_estimate import ErrorEstimate, error_estimate
 from .solve.accuracy.refined_for import RefinedResult, refined_for
+from .solve.dynamics.balance import MotionBalance
 from .solve.dynamics.batch import TrajectoryBatch
 from .solve.dynamics.simulate import simulate
 from .solve.dynamics.trajectory import MotionState, Trajectory
@@ -152,6 +153,7 @@ from .solve.options import (
     Newton,
     ProjectiveDynamics,
 )
+from .solve.statics.balance import EnergyBalance
 from .solve.statics.critical_point import CriticalPoint
 from .solve.statics.energies_at import energies, energy, forces, free_motions, hessian
 from .solve.statics.equilibria import EquilibriumSet
@@ -197,6 +199,7 @@ __all__ = [
     "EdgeLoad",
     "ElasticFoundation",
     "Elastomer",
+    "EnergyBalance",
     "EqualDisplacement",
     "Equilibrium",
     "EquilibriumBatch",
@@ -229,6 +232,7 @@ __all__ = [
     "MinimizeResult",
     "MixedNewton",
     "MooneyRivlin",
+    "MotionBalance",
     "MotionState",
     "MultistartFailed",
     "MultistartResult",

@@ -65,10 +65,13 @@ __all__: list[str] = [
     "fine_face_points",
     "first_order_change",
     "follow_path",
+    "keeps_energy",
+    "kinds_of_terms",
     "lane_angles",
     "lane_logarithms",
     "loaded_part",
     "lowest_modes",
+    "motion_balance",
     "moved",
     "nearest_neighbours",
     "nearest_point",
@@ -94,6 +97,7 @@ __all__: list[str] = [
     "solid_point_states",
     "solve_with_operator",
     "state_on_joints",
+    "term_gradients",
     "touching_pairs",
     "vacuum_permeability",
     "vjp",
@@ -1314,6 +1318,16 @@ def follow_path(
     until: typing.Any = None,
     progress: typing.Any = None,
 ) -> PathResult: ...
+def keeps_energy(model: Model) -> bool:
+    """
+    Whether all forces of the scene, without damping, have a potential.
+    """
+
+def kinds_of_terms(model: Model) -> list[typing.Any]:
+    """
+    (name, number of the body or -1, whether it has no potential) of each term of the energy.
+    """
+
 def lane_angles(
     sines: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     cosines: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
@@ -1353,6 +1367,24 @@ def lowest_modes(
 ) -> tuple[typing.Any, ...]:
     """
     Eigenvalues, shapes of all unknowns (largest displacement 1) nearest to zero, and the number of unstable directions of an equilibrium; none where it is neutral.
+    """
+
+def motion_balance(
+    model: Model,
+    input: MotionInput,
+    substeps: collections.abc.Mapping[
+        typing.SupportsInt | typing.SupportsIndex,
+        collections.abc.Sequence[
+            tuple[
+                typing.SupportsFloat | typing.SupportsIndex, typing.SupportsFloat | typing.SupportsIndex, bool
+            ]
+        ],
+    ],
+    steps_done: typing.SupportsInt | typing.SupportsIndex,
+    progress: typing.Any = None,
+) -> tuple[typing.Any, ...]:
+    """
+    The sums of a motion until each recorded state, which is repeated for them: work and impulses of all forces (n, rows, 7), energies of the terms and of the Maxwell branches, work of parameters that change, kinetic energy and momenta (n, 7); the last state; the names of the terms without energy.
     """
 
 def moved(
@@ -1614,6 +1646,18 @@ def state_on_joints(
 ) -> tuple[typing.Any, ...]:
     """
     A state with its rigid parts on their joints as the values are now, the increments from there to what motors and supports prescribe, and forces of all unknowns on the free ones there.
+    """
+
+def term_gradients(
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    angle_branches: collections.abc.Sequence[
+        collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]
+    ],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+    """
+    The gradient of each term of the energy by all unknowns, (terms, n).
     """
 
 def touching_pairs(

@@ -92,7 +92,7 @@ def test_coarse_steps_of_a_swing_are_warned_of() -> None:
     assert caught[0].message.last_good is not None and "% of the extent" in repr(coarse)
     enough = float(str(caught[0].message).split("Take steps of ")[1].split(" s")[0])
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.filterwarnings("error", ".*of the extent")  # implicit Euler still loses energy
         fine = swinging_strip(round(0.2 / enough), enough, ms.ImplicitEuler())
     assert fine.step_errors.max() < 0.01 * 0.1
 

@@ -35,18 +35,6 @@ std::size_t bytes_of(const SubstepRecord& substep) {
     return bytes;
 }
 
-// Returns the start, with edge rotations in equilibrium if none were given, and new Maxwell branches without stress.
-MotionState beginning(Model& model, const MotionInput& input) {
-    MotionState start = input.start;
-    model.set_angle_branches(start.angle_branches);
-    model.parameters().set_time_varying(input.load_parameters_at(0, 0.0));
-    if (!input.rotations_given)
-        start.q += EdgeRotationEquilibrium(model, start.q, input.load_parameters_at(0, 0.0)).correction();
-    if (input.viscosity.maxwell() && start.e.empty())
-        start.e.assign(input.viscosity.branches.size(), model.elastic().strains(start.q));
-    return start;
-}
-
 // Appends the last state to the recorded ones; its energies are filled in later.
 void record_state(const Model& model, const MotionInput& input, MotionResult& result) {
     const MotionState& state = result.last;
@@ -70,7 +58,7 @@ class Run {
           stepper_(newton, input.tableau, input.inertia, input.viscosity, input.projective),
           balance_(model_, input.inertia, stepper_.free_bodies(), input.tableau) {
         if (grown_) grown_->load_parameters = input_.adaptive.load_parameters(0, 0.0, 1.0);
-        result_.start = result_.last = beginning(newton.model(), input);
+        result_.start = result_.last = start_of_motion(newton.model(), input);
         result_.begun = true;
         result_.watched_energy = !balance_.fails_to_apply();
         if (keep.gradients) plan(keep);
@@ -344,6 +332,17 @@ double covered(Index leaf, Index slots, Index repetitions) {
 }
 
 }  // namespace
+
+MotionState start_of_motion(Model& model, const MotionInput& input) {
+    MotionState start = input.start;
+    model.set_angle_branches(start.angle_branches);
+    model.parameters().set_time_varying(input.load_parameters_at(0, 0.0));
+    if (!input.rotations_given)
+        start.q += EdgeRotationEquilibrium(model, start.q, input.load_parameters_at(0, 0.0)).correction();
+    if (input.viscosity.maxwell() && start.e.empty())
+        start.e.assign(input.viscosity.branches.size(), model.elastic().strains(start.q));
+    return start;
+}
 
 std::pair<Index, double> MotionInput::between(Index step, double fraction) const {
     const Index first = step * (tableau.stages + 1);

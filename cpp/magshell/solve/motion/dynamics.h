@@ -52,6 +52,9 @@ struct MotionInput {
     std::pair<Index, double> between(Index step, double fraction) const;
 };
 
+/// Returns the start of a motion: with edge rotations in equilibrium if none were given, and new Maxwell branches without stress.
+MotionState start_of_motion(Model& model, const MotionInput& input);
+
 /// The data of a motion that are stored for its adjoint. The less is stored, the more steps are computed again.
 enum class AdjointStorage { nothing, checkpoints, stages, factors };
 

@@ -1,6 +1,7 @@
 """Pictures, movies and pages. No other package of magshell imports a plotting library."""
 
 from .animation import animate
+from .balances import plot_balance as _balance  # noqa: F401 - registers EnergyBalance.plot
 from .drawing import plot
 from .fits import plot_fit as _  # noqa: F401 - registers FitResult.plot
 from .gltf import write_gltf

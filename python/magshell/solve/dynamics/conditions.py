@@ -1,4 +1,4 @@
-"""Keeps what a motion was asked for beside its scene, so that it can be repeated on finer meshes."""
+"""Keeps what a motion was asked for beside its scene, so that it can be repeated, on finer meshes too."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ... import _core
 from ..._runtime.keywords import FLUX_DENSITY
 from ..statics.equilibrium import Equilibrium
 from .schedule import AtTimePoints
@@ -26,6 +27,7 @@ class MotionConditions:
     end, 0 first. points_of_step: the time points of each step. damping: (n,) N s/m, of the vertices. viscosity: stiffness
     damping [s], Maxwell moduli [-] and times [s]. start: None for the rest shape, an Equilibrium, or the name of the type of
     what was given. velocities: (n_v, 3) m/s, or None. varying: descriptions of the values of objects that changed in time.
+    core: the input of the core. substeps: {step: the parts in which it was taken}, (begin, end, by implicit Euler).
     """
 
     inputs: Inputs
@@ -39,10 +41,12 @@ class MotionConditions:
     velocities: np.ndarray | None
     varying: tuple[str, ...]
     solver: Newton
+    core: _core.MotionInput
+    substeps: dict[int, Any]
 
     @classmethod
-    def of(cls, given: MotionInputs) -> MotionConditions:
-        """Return the conditions of a motion from its checked inputs."""
+    def of(cls, given: MotionInputs, found: _core.MotionResult) -> MotionConditions:
+        """Return the conditions of a motion from its checked inputs and what the core found."""
         start, n_v = given._given_start, given.inputs.scene.mesh.n_vertices
         known = start is None or isinstance(start, Equilibrium)
         velocity = given.start.velocity
@@ -61,6 +65,8 @@ class MotionConditions:
             velocities=given.inputs.scene._model.positions(velocity)[:n_v] if moves else None,
             varying=given.varying,
             solver=given.solver,
+            core=given.core,
+            substeps=found.substeps,
         )
 
     def keywords(self, intervals: int) -> dict[str, Any]:

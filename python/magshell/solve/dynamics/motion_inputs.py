@@ -151,6 +151,15 @@ class MotionInputs:
             },
         )
 
+    @property
+    def keeps_energy(self) -> bool:
+        """True if no force puts energy in or takes it out: all have potentials, nothing is damped or changes in time."""
+        law, rows = self._law, self._rows
+        is_damped = self._damping.any() or law["stiffness_damping"] != 0.0 or len(law["maxwell_modulus"]) > 0
+        return (
+            _core.keeps_energy(self.inputs.scene._model) and not is_damped and bool((rows == rows[0]).all())
+        )
+
     def recorded(self, name: str, after: np.ndarray) -> np.ndarray:
         """Return a load parameter at the states recorded after so many steps, the start among them, (n, *row)."""
         return self._load_parameters[name][self.time_points.recorded(after)]

@@ -51,6 +51,7 @@ from ..options import (
     as_adjoint_storage,
 )
 from ..statics.equilibrium import Equilibrium
+from .balance import warn_of_energy
 from .conditions import MotionConditions
 from .differentiable_state import DifferentiableState
 from .motion_inputs import MotionInputs
@@ -217,6 +218,7 @@ def run(
     _warn(result)
     warn_of_steps(result)
     warn_of_gains(result)
+    warn_of_energy(result)
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         _warn_of_fields(result)
     except KeyboardInterrupt as stopped:
@@ -397,7 +399,8 @@ def _trajectory(motion_inputs: MotionInputs, found, wall_time: float, known=None
         _driving=driving,
         _rest=motion_inputs.inputs.given_rest,
         _tensors=motion_inputs.tensors_in_states(after),
-        _conditions=MotionConditions.of(motion_inputs),
+        _keeps_energy=motion_inputs.keeps_energy,
+        _conditions=MotionConditions.of(motion_inputs, found),
     )
 
 

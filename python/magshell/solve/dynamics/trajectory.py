@@ -14,7 +14,7 @@ from ..._input.quantity import quantity
 from ..._input.tensors import detached, plain_arrays
 from ..._input.without_gradient import without_gradient
 from ..._runtime.files import replace_file
-from ..._runtime.frozen import FixedDict, immutable
+from ..._runtime.frozen import FixedDict, immutable, remember
 from ..._runtime.mixins import AnimateMixin
 from ..._runtime.npz import open_npz
 from ...model.contact.attached_obstacles import positioned
@@ -33,6 +33,7 @@ from ...model.shells.strains import StrainHistory, strains_of
 from ...model.supports.displacement_ties import Periodic
 from ...model.supports.supports import Clamp, Pin, SymmetryPlane
 from ..options import Clock, Integrator, clock_of
+from .balance import MotionBalance, balance_of_motion, describe_energy
 from .obstacle_paths import ObstaclePath, ReadPath
 from .step_errors import describe_steps
 
@@ -194,6 +195,7 @@ class Trajectory(AnimateMixin, OfOneBody):
     _tensors: Any = field(
         repr=False, default=None
     )  # {(object or None, name): (tensor, whether a row is a state)}
+    _keeps_energy: bool = field(repr=False, default=False)  # whether no force puts energy in or takes it out
     _conditions: Any = field(repr=False, default=None)  # MotionConditions; None in copies and files
 
     def __copy__(self) -> Trajectory:
@@ -328,6 +330,19 @@ class Trajectory(AnimateMixin, OfOneBody):
         positions = self.scene._model.points(self._state_at(index))
         return near_body_kinks(self.scene, self._contact_state(contact, index), smoothing, positions)
 
+    def balance(self) -> MotionBalance:
+        """Return where the energy, the momentum and the angular momentum came from and went, as a MotionBalance.
+
+        The steps of the motion are repeated for it once, which takes about as long as the motion did. ms.StepErrorWarning
+        warns if the steps made or lost more than 5 % of the largest energy that moved and no other warning has said so.
+
+        Raises ValueError for a motion that was copied, or loaded from a file: ask before, and keep the balance.
+        """
+        if (known := vars(self).get("_balance")) is None:
+            known = balance_of_motion(self)
+            remember(self, _balance=known)
+        return known
+
     def strains(self, index: int = -1) -> Any:
         """Return the principal strains of all faces of the shells in a recorded state, by default the last, as Strains.
 
@@ -408,6 +423,7 @@ class Trajectory(AnimateMixin, OfOneBody):
             f"Trajectory: {self.steps_done}{stopped} steps{halved}, {self.times[-1]:.4g} s, {len(self)} states, "
             f"{method}\n"
             f"  {describe_steps(self)}\n"
+            f"  {describe_energy(self)}\n"
             f"  {describe_strains(self, self._largest_strains)}\n"
             f"  {crossings}\n"
             f"{watched}"

@@ -44,6 +44,7 @@ from ...model.shells.obtuse_faces import warn_of_obtuse_faces
 from ...model.shells.strains import StrainHistory, strains_of, warn_if_large
 from ..options import MixedNewton, Newton
 from .along_path import AlongPath, moving_obstacles
+from .balance import EnergyBalance, balance_of_path
 from .critical_point import CriticalPoint, critical_point
 from .equilibrium import Equilibrium
 from .path_events import PathEvent, events_along
@@ -166,6 +167,22 @@ class EquilibriumPath(AnimateMixin, OfOneBody):
         return solve(
             inputs, point.state, point.angle_branches, load_parameters, load_parameters, options
         ).equilibrium
+
+    def balance(self) -> EnergyBalance:
+        """Return the work of loads, supports, fields and others along the path against the change of energy.
+
+        The work between two points follows the trapezoidal rule: the rest falls with the square of `max_step`.
+
+        >>> import magshell as ms
+        >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
+        >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+        >>> load = ms.EdgeLoad(mesh.edges_at(x=0.1), (0, 0, 0.01))
+        >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[load])
+        >>> bending = ms.follow_path(scene).balance()
+        >>> sorted(bending.work), bending.rest_fraction < 0.01
+        (['loads'], True)
+        """
+        return balance_of_path(self)
 
     def _solved_from(self, point: Any, parameter: float) -> Any:
         """Return the core's equilibrium at another parameter, searched from a point nearby; None if none is found."""
