@@ -39,7 +39,7 @@ struct RestGradient {
                          const VectorXd& gradient, const LoadParameters& load_parameters,
                          const VectorXd& by_motor_forces = {}) {
         if (!asked) return;
-        dof_map.held_rest_vjp(by_q - dof_map.expand(dof_map.vector(by_q)), load_parameters, by_nodes);
+        dof_map.held_rest_vjp(by_q, load_parameters, by_nodes);
         dof_map.rest_vjp(by_q, lambda, gradient, by_motor_forces, by_nodes);
     }
 };

@@ -299,10 +299,17 @@ void DofMap::vjp(const VectorXd& by_state, const VectorXd& lambda, const VectorX
 void DofMap::held_rest_vjp(const VectorXd& by_state, const LoadParameters& load_parameters,
                            VectorXd& by_nodes) const {
     const double t = support_factor(load_parameters);
+    VectorXd by_prescribed = by_state;
+    if (const LinearTies* ties = ties_of(reduced_)) {
+        const Frames frames{frame_of_, prescribed_};
+        by_prescribed = frames.into(by_state);
+        ties->gather(by_prescribed);
+        frames.out_of(by_prescribed);
+    }
     for (const PrescribedNode& h : prescribed_)
         for (int axis = 0; axis < h.n_prescribed; ++axis) {
             const Vec3 along = h.frame.col(axis),
-                       by_position = along * along.dot(by_state.segment<3>(3 * h.node));
+                       by_position = along * along.dot(by_prescribed.segment<3>(3 * h.node));
             const Index move = h.moves[axis];
             by_nodes.segment<3>(3 * h.node) += move < 0 ? by_position : moves_[move].by_rest(t, by_position);
         }
