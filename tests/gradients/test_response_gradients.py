@@ -23,6 +23,7 @@ PLAIN = [
 ]
 RIGID = [name for name in PLAIN if kind(name).scene.rigid_parts]
 GROWN = [name for name in PLAIN if name.startswith("a grown")]
+TAUT = [name for name in PLAIN if name.startswith("lengths by default")]
 # Linear theory at rest refuses what acts there already, and about an equilibrium what has no potential.
 ACTING = [
     "a solid with muscles at rest",
@@ -30,6 +31,7 @@ ACTING = [
     "creased at rest",
     "custom energies at rest",
     *GROWN,
+    *TAUT,
 ]
 NO_POTENTIAL = [
     "a solid under pressure at rest",
@@ -41,6 +43,7 @@ STEPS = {"at rest on a Plane, its law given": 1e-4, "creased at rest": 1e-4}
 # Nothing changes there from one load to the other.
 IDLE = [
     "a grown sheet at rest, evenly",
+    "a grown sheet at rest, obtuse",
     "a grown six-node sheet at rest",
     "two sheets with their own field at rest",
 ]

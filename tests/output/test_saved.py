@@ -11,6 +11,7 @@ import pytest
 from gradient_kinds import MAKERS, kind
 from gradient_kinds_batch import RESPONSES
 from gradient_kinds_linear import LINEAR_MAKERS
+from gradient_kinds_shapes import FORCES
 
 import magshell as ms
 
@@ -63,7 +64,7 @@ def reloaded(result, folder, scene=None):
     return ms.load(folder / "result.npz", result.scene if scene is None else scene)
 
 
-@pytest.mark.parametrize("name", [name for name in MAKERS if name not in (*LINEAR_MAKERS, RESPONSES)])
+@pytest.mark.parametrize("name", [name for name in MAKERS if name not in (*LINEAR_MAKERS, RESPONSES, FORCES)])
 def test_every_kind_of_scene(name, tmp_path):
     made = kind(name)
     result = made.found(made.together)

@@ -3,7 +3,7 @@
 from functools import cache
 
 import numpy as np
-from adjoint_scenes import BENDINGS, DEFAULTS, DIPOLES, MAGNETIZATION, MESH, N_V, everything
+from adjoint_scenes import BENDINGS, DEFAULTS, DIPOLES, MAGNETIZATION, MESH, N_V, everything, shell
 from gradient_kinds_actuators import actuated_at_rest, actuated_in_motion
 from gradient_kinds_attached import ATTACHED_MAKERS
 from gradient_kinds_batch import BATCH_MAKERS
@@ -30,6 +30,7 @@ from gradient_kinds_near_magnets import near_magnets
 from gradient_kinds_own_field import bodies_with_own_field, own_field
 from gradient_kinds_pressure import pressed_sheet, pressed_solid
 from gradient_kinds_round import ROUND_MAKERS
+from gradient_kinds_shapes import SHAPE_MAKERS
 from gradient_kinds_six_nodes import six_nodes_at_rest, six_nodes_in_motion
 from gradient_kinds_skeletons import (
     motorized_skeleton_at_rest,
@@ -257,7 +258,25 @@ def from_an_equilibrium(scene, values, **inputs):
 def let_go() -> Kind:
     inputs = {name: IN_TIME[name] for name in ("remanent_magnetization", "applied_flux_density")}
     fixed = {**EXACT, "steps": STEPS, "time_step": 2e-3, "progress": False}
-    return Kind(everything(), inputs, ms.simulate, from_an_equilibrium, fixed, 1e-5, REACH)
+    # A start in supports that have turned takes no rest positions: test_rest_positions.py.
+    return Kind(everything(), inputs, ms.simulate, from_an_equilibrium, fixed, 1e-5, REACH, keeps_shape=True)
+
+
+def let_go_near_a_magnet() -> Kind:
+    """Build a motion under pressure and weight that begins at rest in another field than it goes on in."""
+    magnet = ms.CuboidMagnet(
+        (0.02, 0.02, 0.02), remanent_magnetization=(0.0, 3e3, 6e4), center=(0.05, 0.01, -0.03)
+    )
+    scene = ms.Scene(
+        shell(),
+        supports=[ms.Clamp(MESH.edges_at(x=0.0))],
+        loads=[ms.Pressure(2.0)],
+        field=[ms.UniformField(), magnet],
+        gravity=(1.0, 0.5, -9.81),
+    )
+    inputs = {name: IN_TIME[name] for name in ("remanent_magnetization", "applied_flux_density")}
+    fixed = {**EXACT, "steps": STEPS, "time_step": 2e-3, "progress": False}
+    return Kind(scene, inputs, ms.simulate, from_an_equilibrium, fixed, 1e-5, REACH)
 
 
 RUBS = {"friction_coefficient": 0.4}
@@ -406,6 +425,9 @@ MAKERS = {
     "on springs between points in motion": lambda: on_springs_in_motion(
         ms.TRBDF2(), damped=True, foundations=False
     ),
+    "on damped springs in motion, euler": lambda: on_springs_in_motion(ms.ImplicitEuler(), damped=True),
+    "from an equilibrium near a magnet": let_go_near_a_magnet,
+    **SHAPE_MAKERS,
 }
 
 

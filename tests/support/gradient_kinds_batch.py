@@ -50,15 +50,15 @@ def one_of_responses(scene, values, **given):
     return deflection(ms.linear_response(scene, batch=MEMBERS, values=values, **given)[MEMBER])
 
 
-def of_a_batch(solve, of_linear=False) -> Kind:
+def of_a_batch(solve, keeps_shape=False) -> Kind:
     """Build the sheet on which everything acts, as a member of a batch."""
     controls = {**DEFAULTS, **FACTORS}
-    return Kind(everything(), controls, solve=solve, fixed=EXACT, reach=REACH, of_linear=of_linear)
+    return Kind(everything(), controls, solve=solve, fixed=EXACT, reach=REACH, keeps_shape=keeps_shape)
 
 
 RESPONSES = "a sheet in a batch of linear responses"  # which cannot be saved
 BATCH_MAKERS = {
     "a sheet in a batch of equilibria": lambda: of_a_batch(one_of_equilibria),
     "a sheet in a batch of warm starts": lambda: of_a_batch(one_of_warm_starts),
-    RESPONSES: lambda: of_a_batch(one_of_responses, of_linear=True),
+    RESPONSES: lambda: of_a_batch(one_of_responses, keeps_shape=True),
 }

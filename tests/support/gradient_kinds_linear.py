@@ -60,7 +60,7 @@ def vibrating_at_rest() -> Kind:
     """Build a sheet that vibrates about its rest shape, without loads."""
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.4, mass_density=1e3)
     scene = ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))])
-    return Kind(scene, {}, solve=frequencies_at_rest, reach=REACH, of_linear=True)
+    return Kind(scene, {}, solve=frequencies_at_rest, reach=REACH, keeps_shape=True)
 
 
 def numbers_of(given):
@@ -122,7 +122,7 @@ def responding_sheet(about: bool) -> Kind:
     """Build the sheet on which everything acts; its rest shape or an equilibrium changes by linear theory."""
     inputs = {**DEFAULTS, **FACTORS}
     solve = response_about if about else response
-    return Kind(everything(), inputs, solve=solve, fixed=EXACT, reach=REACH, of_linear=True)
+    return Kind(everything(), inputs, solve=solve, fixed=EXACT, reach=REACH, keeps_shape=True)
 
 
 def column(gravity=(-9.81, 1.0, 0)) -> ms.Scene:
@@ -145,7 +145,7 @@ def buckling_column() -> Kind:
         "remanent_magnetization": (3e3, 1e3, 0),
         "applied_flux_density": (-1e-3, 3e-4, 0),
     }
-    return Kind(column(), inputs, solve=buckling, reach=REACH, of_linear=True)
+    return Kind(column(), inputs, solve=buckling, reach=REACH, keeps_shape=True)
 
 
 def buckling_six_node_column() -> Kind:
@@ -246,7 +246,7 @@ def snapping_flaps() -> Kind:
     n = scene.bodies[0].mesh.n_faces
     magnetization = np.repeat([[2.4e4, 1e3, 0.0], [-2.6e4, 1e3, 0.0]], n, axis=0)
     inputs = {"remanent_magnetization": magnetization, "applied_flux_density": (1e-4, -2e-4, 2e-2)}
-    return Kind(scene, inputs, solve=snap_together, fixed=EXACT, reach=REACH, of_linear=True)
+    return Kind(scene, inputs, solve=snap_together, fixed=EXACT, reach=REACH, keeps_shape=True)
 
 
 OF_SHEET = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
@@ -270,7 +270,7 @@ def snapping_beam() -> Kind:
         **FACTORS,
     }
     reach = {**REACH, "displacement": 3e-4, "rotation": 0.01, "center": 1e-3}
-    return Kind(scene, inputs, solve=snap, fixed=EXACT, reach=reach, of_linear=True)
+    return Kind(scene, inputs, solve=snap, fixed=EXACT, reach=reach, keeps_shape=True)
 
 
 def vibrating_with_own_field() -> Kind:

@@ -51,9 +51,9 @@ def muscles_at_rest() -> Kind:
     return Kind(scene, {"load_factor": 0.9, "gravity_factor": 1.1}, fixed=EXACT, reach=REACH)
 
 
-def muscles_in_motion(integrator, in_time: int = 0) -> Kind:
+def muscles_in_motion(integrator, in_time: int = 0, element: str = "linear") -> Kind:
     """Build a motion that is fast enough for the force-velocity curve to matter."""
-    body = _body("linear")
+    body = _body(element)
     scene = ms.Scene(
         body,
         supports=[ms.Pin(body.mesh.vertices_at(x=0.0))],
@@ -61,7 +61,7 @@ def muscles_in_motion(integrator, in_time: int = 0) -> Kind:
         gravity=(0.2, 0.1, -9.81),
     )
     fixed = {**EXACT, "steps": 3, "integrator": integrator, "progress": False}
-    x = body.mesh.rest_positions
+    x = body.rest_positions
     inputs = {
         "time_step": 2e-3,
         "velocities": (x[:, :1] / 0.1) * (0.3, 0.2, -0.4) * RNG.uniform(0.8, 1.2, (len(x), 1)),

@@ -35,7 +35,12 @@ def _on_springs(damped: bool, foundations: bool = True) -> tuple[list, list, lis
             damping=0.05,
         ),
         ms.Spring((weight, (0.09, 0.02, -0.04)), stiffness=0.7, **({"damping": 0.02} if damped else {})),
-        ms.Spring((sheet, TIPS), stiffness=SOME.uniform(0.2, 0.4, n), direction=(0.3, -0.2, 1.0)),
+        ms.Spring(
+            (sheet, TIPS),
+            stiffness=SOME.uniform(0.2, 0.4, n),
+            direction=(0.3, -0.2, 1.0),
+            **({"damping": 0.03} if damped else {}),
+        ),
         ms.ElasticFoundation(
             SOME.uniform(400, 800, len(faces)),
             faces=faces,

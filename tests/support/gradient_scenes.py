@@ -12,6 +12,7 @@ from functools import cache, cached_property
 
 import numpy as np
 import pytest
+from gradient_shapes import BoundShape, is_bound
 
 import magshell as ms
 from magshell.model.scene.reshaped import reshaped
@@ -41,8 +42,8 @@ class Kind:
     solve: (scene, start=None, **keywords) to what has positions; function: the one of magshell behind it. inputs: by
     keyword, the inputs that belong to no object. fixed: other keywords. step: of differences, over the size of a
     value; reach: that size, where it is not the value's own. in_time: steps of the motion over which everything
-    varies_in_time somewhere that can, or 0. of_linear: whether it is a solve of linear theory or a path that takes no rest
-    positions.
+    varies_in_time somewhere that can, or 0. keeps_shape: whether the solve takes no rest positions. by_default: names of
+    values that stay as they were made where all inputs are given together, as they follow from rest positions then.
     """
 
     scene: ms.Scene
@@ -53,7 +54,8 @@ class Kind:
     step: float = 1e-4
     reach: dict[str, float] = field(default_factory=dict)
     in_time: int = 0
-    of_linear: bool = False
+    keeps_shape: bool = False
+    by_default: tuple[str, ...] = ()
 
     def found(self, given: dict[tuple, object], start=None):
         """Find the solution with these inputs, {(object or None, name): value}, in place of its own."""
@@ -61,6 +63,9 @@ class Kind:
         for (owner, name), value in given.items():
             if owner is None:
                 keywords[name] = value
+            elif isinstance(owner, BoundShape):
+                for body, rest in owner.bodies(value).items():
+                    values.setdefault(body, {})[name] = rest
             else:
                 values.setdefault(owner, {})[name] = value
         if start is not None:
@@ -72,22 +77,15 @@ class Kind:
         """The values of all objects in the scene, {(object, name): value}."""
         owners = (self.scene, *self.scene.objects)
         moving = self.function is ms.simulate
-        return {
+        found = {
             (owner, name): self._over_time(owner, name, np.array(value, dtype=np.float64))
             for owner in owners
             for name, value in _values_of(self.scene, owner, moving).items()
-            if self._takes(owner, name)
+            if name != "rest_positions" or not self.keeps_shape
         }
-
-    def _takes(self, owner, name: str) -> bool:
-        """Return whether the solve takes this value, and has a gradient by it."""
-        if name != "rest_positions":
-            return True
-        turning = self.function is ms.simulate and any(
-            isinstance(each, ms.Pin | ms.Clamp) and each._move.rotation is not None
-            for each in self.scene.supports
-        )
-        return not (self.of_linear or turning) and rest_positions_follow(self.scene, owner)
+        if is_bound(self.scene) and not self.keeps_shape:
+            found[BoundShape(self.scene), "rest_positions"] = np.array(self.scene.mesh.rest_positions)
+        return found
 
     def varies_in_time(self, owner, name: str) -> bool:
         """Return whether this value is another at each end of a step."""
@@ -139,7 +137,7 @@ class Kind:
 
     def _once(self, key: tuple) -> bool:
         owner, name = key
-        return name in self.inputs if owner is None else name != "vertex_loads"
+        return name in self.inputs if owner is None else name not in ("vertex_loads", *self.by_default)
 
     @cached_property
     def entries(self) -> dict[tuple, np.ndarray]:
@@ -166,6 +164,8 @@ def label(kind: Kind, key: tuple) -> str:
     """Return the name of an input for messages."""
     owner, name = key
     if owner is None:
+        return name
+    if isinstance(owner, BoundShape):
         return name
     owners = [kind.scene, *kind.scene.objects]
     number = next(k for k, each in enumerate(owners) if each is owner)
@@ -212,12 +212,8 @@ def _names_of(kind: type) -> tuple[str, ...]:
 
 def rest_positions_follow(scene: ms.Scene, body) -> bool:
     """Return whether there is a gradient by the rest positions of a body of the scene, in all directions."""
-    if any(isinstance(support, ms.SymmetryPlane) for support in scene.supports):
-        return False  # vertices must stay in the plane: test_rest_positions.py moves them within
-    if scene.ties:
-        return False  # welded vertices must move together: test_rest_positions_of_assemblies.py moves them
-    if any(isinstance(support, ms.Periodic) for support in scene.supports):
-        return False  # images must stay images: test_rest_positions_of_connections.py moves them so
+    if is_bound(scene):
+        return False  # there is one by those of all bodies together: BoundShape
     given = torch.tensor(body.rest_positions, requires_grad=True)
     try:
         reshaped(scene, {body: {"rest_positions": given}})
