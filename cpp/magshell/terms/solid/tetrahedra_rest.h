@@ -31,10 +31,9 @@ SimdMat3 tangent_along(const Tangent& tangent, const SimdMat3& l) {
     return {{sum[0].x, sum[1].x, sum[2].x, sum[0].y, sum[1].y, sum[2].y, sum[0].z, sum[1].z, sum[2].z}};
 }
 
-template <class Element, class Material, class Moduli, bool mean>
+template <class Element, class Material, class Moduli>
 template <class OfPoints>
-void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest(VectorXd& out,
-                                                               const OfPoints& of_points) const {
+void TetrahedraTerm<Element, Material, Moduli>::add_rest(VectorXd& out, const OfPoints& of_points) const {
     std::vector<std::array<Vec3, N>> by_nodes(this->elements());
     loop_.each_group([&](Index group) {
         SimdMat3 by_deformation[points];
@@ -52,9 +51,9 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest(VectorXd& out,
         for (int k = 0; k < N; ++k) out.segment<3>(3 * this->element_nodes_[t][k]) += by_nodes[t][k];
 }
 
-template <class Element, class Material, class Moduli, bool mean>
-void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest_vjp(const double* q, const LoadParameters&,
-                                                                   const double* lambda, VectorXd& out) {
+template <class Element, class Material, class Moduli>
+void TetrahedraTerm<Element, Material, Moduli>::add_rest_vjp(const double* q, const LoadParameters&,
+                                                             const double* lambda, VectorXd& out) {
     const SimdDouble zero(0.0), one(1.0);
     const SimdVec3 x{one, zero, zero}, y{zero, one, zero}, z{zero, zero, one};
     const SimdVec3 axes[4] = {-(x + y + z), x, y, z};
@@ -68,9 +67,9 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest_vjp(const double*
             const SimdDouble volume = rest_[group].volume[p];
             const SimdMat3 &f = state.f[p], along = gradient_of(group, p, adjoint);
             SimdDouble s[stresses_];
-            state.at[p].stress(c, state.of(p).pressure, s);
+            state.at[p].stress(c, state.volumetric[p].pressure, s);
             const SimdMat3 piola = state.at[p].piola(c, s);
-            const SimdDouble bulk = mean ? SimdDouble(0.0) : state.of(p).bulk;
+            const SimdDouble bulk = mean() ? SimdDouble(0.0) : state.volumetric[p].bulk;
             const typename Material::template Tangent<4> tangent(state.at[p], c, s, bulk, volume, axes);
             SimdMat3& by = by_deformation[p];
             by =
@@ -79,7 +78,8 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest_vjp(const double*
             if (this->history_.shift) by += viscous_by_rest(group, p, f, along);
             volume_rate += volume * state.at[p].volume_rate(along);
         }
-        if constexpr (mean) {
+        if constexpr (may_average) {
+            if (!mean()) return;
             const SimdDouble more = state.volumetric[0].bulk * volume_rate / rest_[group].total();
             for (int p = 0; p < points; ++p) {
                 const SimdDouble share = more * rest_[group].volume[p];
@@ -93,10 +93,9 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest_vjp(const double*
 
 // The viscous power is V S : sym(F^T L) with the stresses S of d = (scale - 1) E - shift. The shift is that of earlier states
 // (strains_vjp).
-template <class Element, class Material, class Moduli, bool mean>
-SimdMat3 TetrahedraTerm<Element, Material, Moduli, mean>::viscous_by_rest(Index group, int p,
-                                                                          const SimdMat3& f,
-                                                                          const SimdMat3& along) const {
+template <class Element, class Material, class Moduli>
+SimdMat3 TetrahedraTerm<Element, Material, Moduli>::viscous_by_rest(Index group, int p, const SimdMat3& f,
+                                                                    const SimdMat3& along) const {
     SimdDouble d[6], rate[6], of_d[6], of_rate[6], power(0.0);
     beyond_elastic(group, p, f, d);
     ViscousStrain::rate(f, along, rate);
