@@ -19,12 +19,12 @@ pythons := $(wildcard python benchmarks tests examples docs scripts)
 cpps = $(shell find cpp -name '*.h' -o -name '*.cpp')
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test room nightly change seconds docs gallery wheel sanitize processors lint format stubs clean
+.PHONY: help demo test room nightly change seconds compile-seconds docs gallery wheel sanitize processors lint format stubs clean
 .DELETE_ON_ERROR:
 .SECONDARY:
 
 help:  ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.with-plot  ## the bistable magnetic beam: critical field and pictures, in out/
 	$(VENV)/bin/python examples/bistable_beam.py
@@ -49,6 +49,9 @@ change: $(VENV)/.with-test  ## the nightly tests of the rooms that changed since
 seconds: $(VENV)/.with-test  ## measure again which tests take long, and so are nightly: every test
 	$(PYTEST) --junitxml=build/tests.xml
 	$(VENV)/bin/python scripts/test_seconds.py build/tests.xml tests/seconds.txt
+
+compile-seconds: $(VENV)/.wheel  ## what compiling took by room, and what grew since it was recorded
+	$(VENV)/bin/python scripts/compile_seconds.py show build/compile_seconds.txt
 
 docs: $(VENV)/.with-docs  ## the manual, in docs/_build/html; warnings are errors
 	$(VENV)/bin/python -m sphinx -W --keep-going -q -j auto -b html docs docs/_build/html
@@ -103,7 +106,8 @@ $(VENV)/.wheel: $(sources) $(VENV)/.created
 	@env -u MAKEFLAGS $(VENV)/bin/python scripts/build_progress.py build/make.log \
 	    $(PIP) wheel --verbose --no-deps --no-build-isolation --check-build-dependencies \
 	    --config-settings=build-dir=build/make --config-settings=cmake.define.MAGSHELL_TESTING=ON \
-	    --config-settings=cmake.define.MAGSHELL_COMPILE_TOGETHER=$(COMPILE_TOGETHER) --wheel-dir build/wheels .
+	    --config-settings=cmake.define.MAGSHELL_COMPILE_TOGETHER=$(COMPILE_TOGETHER) \
+	    --config-settings=cmake.define.MAGSHELL_COMPILE_SECONDS=$(CURDIR)/build/compile_seconds.txt --wheel-dir build/wheels .
 	$(PIP) install --quiet --no-deps --force-reinstall build/wheels/*.whl
 	touch $@
 

@@ -6,6 +6,8 @@
 #include <array>
 #include <cstdint>
 
+#include "magshell/core/small_matrices.h"
+
 namespace magshell {
 
 using Index =

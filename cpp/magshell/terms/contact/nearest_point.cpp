@@ -1,6 +1,5 @@
 #include "magshell/terms/contact/nearest_point.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 namespace magshell {
@@ -108,11 +107,17 @@ void NearestPoint::search_ellipsoid(const Vec3& middle, const Mat3& half, const 
     place = now.place;
     at = now.at;
     moving = 2;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> principal(now.curvature(half));
-    for (int k = 0; k < 2; ++k) {
-        directions[k] = now.tangents * principal.eigenvectors().col(k);
-        stretches[k] = principal.eigenvalues()[k];
-    }
+    set_principal(now.curvature(half), now.tangents);
+}
+
+// With the angle a of the greater one, tan 2a = 2 c10/(c00 - c11): closed, as Eigen's solver takes long to compile.
+void NearestPoint::set_principal(const Eigen::Matrix2d& c, const Eigen::Matrix<double, 3, 2>& tangents) {
+    const double mean = 0.5 * (c(0, 0) + c(1, 1)), half_difference = 0.5 * (c(0, 0) - c(1, 1));
+    const double radius = std::hypot(half_difference, c(1, 0));
+    const double angle = 0.5 * std::atan2(c(1, 0), half_difference);
+    const Vec3 u = tangents.col(0), v = tangents.col(1);
+    directions = {std::cos(angle) * v - std::sin(angle) * u, std::cos(angle) * u + std::sin(angle) * v};
+    stretches = {mean - radius, mean + radius};
 }
 
 }  // namespace magshell

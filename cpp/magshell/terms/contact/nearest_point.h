@@ -37,6 +37,8 @@ struct NearestPoint {
   private:
     void search_segment(double crown, const Vec3& middle, const Vec3& half, const DistanceAt& distance);
     void search_ellipsoid(const Vec3& middle, const Mat3& half, const DistanceAt& distance);
+    /// Sets the directions and stretches from the second derivatives along two tangents.
+    void set_principal(const Eigen::Matrix2d& curvature, const Eigen::Matrix<double, 3, 2>& tangents);
 };
 
 }  // namespace magshell

@@ -8,12 +8,7 @@ namespace {
 std::unique_ptr<SolidTerm> make_projective_term(const SolidTermInput& input) {
     if (input.response.mean_volume)
         throw InvalidInput("the Projective energy has no part that acts on the mean volume of an element");
-    const Solid& solid = input.solid;
-    if (solid.quadratic())
-        return std::make_unique<TetrahedraTerm<QuadraticTetrahedron, Projective, LameModuli, false>>(
-            input, solid.quadratic_nodes);
-    return std::make_unique<TetrahedraTerm<LinearTetrahedron, Projective, LameModuli, false>>(
-        input, solid.linear_nodes);
+    return make_tetrahedra_term<Projective, LameModuli>(input);
 }
 
 }  // namespace

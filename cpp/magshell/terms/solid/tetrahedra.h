@@ -46,7 +46,7 @@ inline double first_root(const double c[4], double longest) {
     return longest;
 }
 
-template <class Element, class Material, class Moduli, bool mean>
+template <class Element, class Material, class Moduli>
 class Tetrahedra : public SolidTerm, public ElementEnergies {
   public:
     Tetrahedra(const SolidTermInput& input,
@@ -58,6 +58,7 @@ class Tetrahedra : public SolidTerm, public ElementEnergies {
           moduli_(input),
           rest_(loop_.groups()),
           constants_(loop_.groups()),
+          has_mean_(input.response.mean_volume),
           height_(input.solid.smallest_height()) {
         for (Index group = 0; group < loop_.groups(); ++group)
             for (int lane = 0; lane < SimdDouble::width; ++lane) {
@@ -201,7 +202,7 @@ class Tetrahedra : public SolidTerm, public ElementEnergies {
             const State state(*this, group, q);
             for (int p = 0; p < points; ++p) {
                 SimdDouble s[Material::stresses];
-                state.at[p].stress(constants_[group].at, state.of(p).pressure, s);
+                state.at[p].stress(constants_[group].at, state.volumetric[p].pressure, s);
                 const SimdMat3& f = state.f[p];
                 const SimdMat3 cauchy = SimdDouble(1.0) / determinant(f, cofactor(f)) *
                                         multiply(state.at[p].piola(constants_[group].at, s), transpose(f));
@@ -222,15 +223,22 @@ class Tetrahedra : public SolidTerm, public ElementEnergies {
 
   protected:
     static constexpr int N = Element::nodes, points = Element::points, n_constants = Material::constants;
+    // Whether there is a mean of several points, and a part of the energy that can act on it.
+    static constexpr bool may_average =
+        points > 1 && requires(const Material& at, const SimdVec3& g) { at.volume_gradient(g); };
+
+    /// Returns whether the volumetric energy is evaluated at the mean volume of an element. It is asked when the program runs, as an
+    /// element with a mean and one without are nearly the same code, and each takes long to compile.
+    bool mean() const { return may_average && has_mean_; }
 
     /// Returns a function of a SIMD vector that computes the energies [J] of its elements.
     auto energy_of_group(const double* q) const {
         return [this, q](Index group) {
             const State state(*this, group, q);
-            SimdDouble total = mean ? rest_[group].total() * state.volumetric[0].energy : SimdDouble(0.0);
+            SimdDouble total = mean() ? rest_[group].total() * state.volumetric[0].energy : SimdDouble(0.0);
             for (int p = 0; p < points; ++p) {
                 SimdDouble density = state.at[p].energy(constants_[group].at);
-                if constexpr (!mean) density += state.volumetric[p].energy;
+                if (!mean()) density += state.volumetric[p].energy;
                 total += rest_[group].volume[p] * density;
             }
             return total;
@@ -254,7 +262,7 @@ class Tetrahedra : public SolidTerm, public ElementEnergies {
     struct State {
         SimdMat3 f[points];
         Material at[points];
-        Volumetric volumetric[mean ? 1 : points];
+        Volumetric volumetric[points];  // with a mean volume all the same
         SimdDouble mean_measure;
 
         State(const Tetrahedra& term, Index group, const double* q)
@@ -262,27 +270,30 @@ class Tetrahedra : public SolidTerm, public ElementEnergies {
 
         /// Evaluates the law at other measures, those of each point in a row.
         void take_measures(const Tetrahedra& term, Index group, const SimdDouble* measures) {
-            SimdDouble before[mean ? 1 : points];
-            for (int k = 0; k < (mean ? 1 : points); ++k) before[k] = measure(k);
+            const SimdDouble* c = term.constants_[group].at;
+            SimdDouble before[points];
+            for (int k = 0; k < points; ++k) before[k] = at[k].volume_measure();
+            const SimdDouble mean_before = mean_measure;
             for (int p = 0; p < points; ++p) at[p].take_measures(measures + Material::stored_measures * p);
             respond(term, group);
-            for (int k = 0; k < (mean ? 1 : points); ++k)
-                volumetric[k].bulk = Material::bulk_between(term.constants_[group].at, measure(k), before[k]);
+            if (term.mean()) {
+                volumetric[0].bulk = Material::bulk_between(c, mean_measure, mean_before);
+                for (int k = 1; k < points; ++k) volumetric[k].bulk = volumetric[0].bulk;
+            } else {
+                for (int k = 0; k < points; ++k)
+                    volumetric[k].bulk = Material::bulk_between(c, at[k].volume_measure(), before[k]);
+            }
         }
 
-        /// Returns the volumetric response at a point.
-        const Volumetric& of(int p) const { return volumetric[mean ? 0 : p]; }
-
       private:
-        SimdDouble measure(int k) const { return mean ? mean_measure : at[k].volume_measure(); }
-
         void respond(const Tetrahedra& term, Index group) {
             const SimdDouble* c = term.constants_[group].at;
-            if constexpr (mean) {
+            if (term.mean()) {
                 SimdDouble sum(0.0);
                 for (int k = 0; k < points; ++k) sum += term.rest_[group].volume[k] * at[k].volume_measure();
                 mean_measure = sum / term.rest_[group].total();
                 volumetric[0] = Material::volumetric(c, mean_measure);
+                for (int k = 1; k < points; ++k) volumetric[k] = volumetric[0];
             } else {
                 for (int k = 0; k < points; ++k)
                     volumetric[k] = Material::volumetric(c, at[k].volume_measure());
@@ -332,6 +343,7 @@ class Tetrahedra : public SolidTerm, public ElementEnergies {
     Moduli moduli_;
     std::vector<Rest> rest_;
     std::vector<Constants> constants_;
+    const bool has_mean_;
     const double height_;
 };
 

@@ -31,10 +31,9 @@ SimdMat3 tangent_along(const Tangent& tangent, const SimdMat3& l) {
     return {{sum[0].x, sum[1].x, sum[2].x, sum[0].y, sum[1].y, sum[2].y, sum[0].z, sum[1].z, sum[2].z}};
 }
 
-template <class Element, class Material, class Moduli, bool mean>
+template <class Element, class Material, class Moduli>
 template <class OfPoints>
-void TetrahedraTerm<Element, Material, Moduli, mean>::add_rest(VectorXd& out,
-                                                               const OfPoints& of_points) const {
+void TetrahedraTerm<Element, Material, Moduli>::add_rest(VectorXd& out, const OfPoints& of_points) const {
     std::vector<std::array<Vec3, N>> by_nodes(this->elements());
     loop_.each_group([&](Index group) {
         SimdMat3 by_deformation[points];
@@ -59,9 +58,9 @@ inline std::array<SimdVec3, 4> unit_gradients() {
     return {-(x + y + z), x, y, z};
 }
 
-template <class Element, class Material, class Moduli, bool mean>
+template <class Element, class Material, class Moduli>
 template <class Rates>
-void TetrahedraTerm<Element, Material, Moduli, mean>::add_work_rest_vjp(const double* q, const Rates& rates,
+void TetrahedraTerm<Element, Material, Moduli>::add_work_rest_vjp(const double* q, const Rates& rates,
                                                                         VectorXd& out) const {
     const std::array<SimdVec3, 4> axes = unit_gradients();
     add_rest(out, [&](Index group, SimdMat3 by_deformation[points]) {
@@ -74,9 +73,9 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_work_rest_vjp(const do
             const SimdDouble volume = rest_[group].volume[p];
             const SimdMat3 &f = state.f[p], &along = all_along[p];
             SimdDouble s[stresses_];
-            state.at[p].stress(c, state.of(p).pressure, s);
+            state.at[p].stress(c, state.volumetric[p].pressure, s);
             const SimdMat3 piola = state.at[p].piola(c, s);
-            const SimdDouble bulk = mean ? SimdDouble(0.0) : state.of(p).bulk;
+            const SimdDouble bulk = mean() ? SimdDouble(0.0) : state.volumetric[p].bulk;
             const typename Material::template Tangent<4> tangent(state.at[p], c, s, bulk, volume,
                                                                  axes.data());
             SimdMat3& by = by_deformation[p];
@@ -86,7 +85,8 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_work_rest_vjp(const do
             if (this->history_.shift) by += viscous_by_rest(group, p, f, along);
             volume_rate += volume * state.at[p].volume_rate(along);
         }
-        if constexpr (mean) {
+        if constexpr (may_average) {
+            if (!mean()) return;
             const SimdDouble more = state.volumetric[0].bulk * volume_rate / rest_[group].total();
             for (int p = 0; p < points; ++p) {
                 const SimdDouble share = more * rest_[group].volume[p];
@@ -98,9 +98,9 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_work_rest_vjp(const do
     });
 }
 
-template <class Element, class Material, class Moduli, bool mean>
+template <class Element, class Material, class Moduli>
 template <class Rates>
-Strains TetrahedraTerm<Element, Material, Moduli, mean>::stress_rates(const double* q,
+Strains TetrahedraTerm<Element, Material, Moduli>::stress_rates(const double* q,
                                                                       const Rates& rates) const {
     const std::array<SimdVec3, 4> axes = unit_gradients();
     Strains out(this->elements(), 6 * points);
@@ -113,16 +113,16 @@ Strains TetrahedraTerm<Element, Material, Moduli, mean>::stress_rates(const doub
         for (int p = 0; p < points; ++p) {
             const SimdDouble volume = rest_[group].volume[p];
             SimdDouble s[stresses_];
-            state.at[p].stress(c, state.of(p).pressure, s);
+            state.at[p].stress(c, state.volumetric[p].pressure, s);
             piola[p] = volume * state.at[p].piola(c, s);
-            const SimdDouble bulk = mean ? SimdDouble(0.0) : state.of(p).bulk;
+            const SimdDouble bulk = mean() ? SimdDouble(0.0) : state.volumetric[p].bulk;
             by[p] = tangent_along(
                 typename Material::template Tangent<4>(state.at[p], c, s, bulk, volume, axes.data()),
                 along[p]);
             volume_rate += volume * state.at[p].volume_rate(along[p]);
         }
         for (int p = 0; p < points; ++p) {
-            if constexpr (mean)
+            if (mean())
                 by[p] += state.volumetric[0].bulk * volume_rate / rest_[group].total() *
                          rest_[group].volume[p] * state.at[p].volume_piola();
             const SimdMat3 cofactors = cofactor(state.f[p]);
@@ -138,13 +138,13 @@ Strains TetrahedraTerm<Element, Material, Moduli, mean>::stress_rates(const doub
     return out;
 }
 
-template <class Element, class Material, class Moduli, bool mean>
-void TetrahedraTerm<Element, Material, Moduli, mean>::freeze_stress_rates(const double* p) {
+template <class Element, class Material, class Moduli>
+void TetrahedraTerm<Element, Material, Moduli>::freeze_stress_rates(const double* p) {
     frozen_ = p ? stress_rates(state_.data(), along_motion(p)) : Strains(this->elements(), 6 * points);
 }
 
-template <class Element, class Material, class Moduli, bool mean>
-void TetrahedraTerm<Element, Material, Moduli, mean>::add_stress_work_vjp(const double* q,
+template <class Element, class Material, class Moduli>
+void TetrahedraTerm<Element, Material, Moduli>::add_stress_work_vjp(const double* q,
                                                                           const Strains& curvatures,
                                                                           Residual& by_q, Gradient& out,
                                                                           VectorXd* by_rest) {
@@ -156,10 +156,9 @@ void TetrahedraTerm<Element, Material, Moduli, mean>::add_stress_work_vjp(const 
 
 // The viscous power is V S : sym(F^T L) with the stresses S of d = (scale - 1) E - shift. The shift is that of earlier states
 // (strains_vjp).
-template <class Element, class Material, class Moduli, bool mean>
-SimdMat3 TetrahedraTerm<Element, Material, Moduli, mean>::viscous_by_rest(Index group, int p,
-                                                                          const SimdMat3& f,
-                                                                          const SimdMat3& along) const {
+template <class Element, class Material, class Moduli>
+SimdMat3 TetrahedraTerm<Element, Material, Moduli>::viscous_by_rest(Index group, int p, const SimdMat3& f,
+                                                                    const SimdMat3& along) const {
     SimdDouble d[6], rate[6], of_d[6], of_rate[6], power(0.0);
     beyond_elastic(group, p, f, d);
     ViscousStrain::rate(f, along, rate);

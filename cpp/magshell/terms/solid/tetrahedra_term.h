@@ -50,11 +50,11 @@ struct ViscousStrain {
     }
 };
 
-template <class Element, class Material, class Moduli, bool mean>
-class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>, public RestShapeTerm {
-    using Base = Tetrahedra<Element, Material, Moduli, mean>;
-    using Base::N, Base::points, Base::n_constants, Base::loop_, Base::rest_, Base::constants_,
-        Base::gradient_of, Base::add_pull;
+template <class Element, class Material, class Moduli>
+class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli>, public RestShapeTerm {
+    using Base = Tetrahedra<Element, Material, Moduli>;
+    using Base::N, Base::points, Base::n_constants, Base::may_average, Base::loop_, Base::rest_,
+        Base::constants_, Base::mean, Base::gradient_of, Base::add_pull;
     using typename Base::State;
     static constexpr int stresses_ = Material::stresses;
     // Stored per point: its stresses, or its measures at the end of a linearized step.
@@ -81,7 +81,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
             SimdVec3 g[N], force[N];
             for (int p = 0; p < points; ++p) {
                 SimdDouble s[stresses_];
-                state.at[p].stress(constants_[group].at, state.of(p).pressure, s);
+                state.at[p].stress(constants_[group].at, state.volumetric[p].pressure, s);
                 if constexpr (!measures_) std::copy_n(s, kept_, stress_.at(group) + p * kept_);
                 SimdMat3 piola = state.at[p].piola(constants_[group].at, s);
                 if (this->history_.shift) {
@@ -110,16 +110,16 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
             for (int p = 0; p < points; ++p) {
                 Element::gradients(rest_[group].gradients[p], p, g);
                 const SimdDouble volume = rest_[group].volume[p];
-                const SimdDouble bulk = mean ? SimdDouble(0.0) : state.of(p).bulk;
+                const SimdDouble bulk = mean() ? SimdDouble(0.0) : state.volumetric[p].bulk;
                 SimdDouble s[stresses_];
                 if constexpr (measures_)
-                    state.at[p].stress(c, state.of(p).pressure, s);
+                    state.at[p].stress(c, state.volumetric[p].pressure, s);
                 else
                     std::copy_n(stress.at(group) + p * kept_, kept_, s);
                 const typename Material::template Tangent<N> tangent(state.at[p], c, s, bulk, volume, g);
                 add_blocks<N>(tangent, p == 0, h);
-                if constexpr (mean)
-                    for (int k = 1; k < N; ++k) {
+                if constexpr (may_average)
+                    for (int k = 1; mean() && k < N; ++k) {
                         const SimdVec3 share = volume * state.at[p].volume_gradient(g[k]);
                         volume_gradient[k] = p == 0 ? share : volume_gradient[k] + share;
                     }
@@ -131,7 +131,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
                                   false, h);
                 }
             }
-            if constexpr (mean) {
+            if (mean()) {
                 const SimdDouble bulk = state.volumetric[0].bulk / rest_[group].total();
                 for (int k = 1; k < N; ++k)
                     for (int l = 1; l <= k; ++l)
@@ -151,16 +151,17 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
             SimdDouble mean_rate(0.0);
             for (int p = 0; p < points; ++p) {
                 along[p] = gradient_of(group, p, p_nodes);
-                if constexpr (mean) mean_rate += rest_[group].volume[p] * state.at[p].volume_rate(along[p]);
+                if (mean()) mean_rate += rest_[group].volume[p] * state.at[p].volume_rate(along[p]);
             }
-            if constexpr (mean) mean_rate = mean_rate / rest_[group].total();
+            if (mean()) mean_rate = mean_rate / rest_[group].total();
             for (int p = 0; p < points; ++p) {
                 SimdDouble* kept = extrapolated_.at(group) + p * kept_;
                 if constexpr (measures_) {
                     state.at[p].measures_after(along[p], kept);
                 } else {
-                    const SimdDouble rate = mean ? mean_rate : state.at[p].volume_rate(along[p]);
-                    state.at[p].stress_rate(constants_[group].at, along[p], state.of(p).bulk * rate, kept);
+                    const SimdDouble rate = mean() ? mean_rate : state.at[p].volume_rate(along[p]);
+                    state.at[p].stress_rate(constants_[group].at, along[p], state.volumetric[p].bulk * rate,
+                                            kept);
                     for (int i = 0; i < kept_; ++i) kept[i] += stress_.at(group)[p * kept_ + i];
                 }
                 if (!this->history_.shift) continue;
@@ -290,14 +291,14 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
                 state.at[p].work_by_constants(c, along, share);
                 add(volume);
                 rate += volume * state.at[p].volume_rate(along);
-                if constexpr (!mean) {
+                if (!mean()) {
                     Material::pressure_by_constants(c, state.at[p].volume_measure(), share);
                     add(rate);
                     rate = SimdDouble(0.0);
                 }
                 if (this->history_.shift) add_viscous_vjp(group, p, state.f[p], along, by);
             }
-            if constexpr (mean) {
+            if (mean()) {
                 Material::pressure_by_constants(c, state.mean_measure, share);
                 add(rate);
             }
@@ -361,7 +362,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
 
     RestModuli viscous_moduli(Index group) const {
         RestModuli moduli = Material::rest_moduli(constants_[group].at);
-        if constexpr (mean) moduli.lambda = SimdDouble(-2.0 / 3.0) * moduli.mu;
+        if (mean()) moduli.lambda = SimdDouble(-2.0 / 3.0) * moduli.mu;
         return moduli;
     }
 
@@ -386,7 +387,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli, mean>,
         RestModuli moduli = ViscousStrain::work_by_moduli(d, rate);
         moduli.lambda *= rest_[group].volume[p];
         moduli.mu *= rest_[group].volume[p];
-        if constexpr (mean) {
+        if (mean()) {
             moduli.mu += SimdDouble(-2.0 / 3.0) * moduli.lambda;
             moduli.lambda = SimdDouble(0.0);
         }
@@ -411,14 +412,10 @@ namespace magshell {
 template <class Material, class Moduli>
 std::unique_ptr<SolidTerm> make_tetrahedra_term(const SolidTermInput& input) {
     const Solid& solid = input.solid;
-    if (!solid.quadratic())
-        return std::make_unique<TetrahedraTerm<LinearTetrahedron, Material, Moduli, false>>(
-            input, solid.linear_nodes);
-    if (input.response.mean_volume)
-        return std::make_unique<TetrahedraTerm<QuadraticTetrahedron, Material, Moduli, true>>(
+    if (solid.quadratic())
+        return std::make_unique<TetrahedraTerm<QuadraticTetrahedron, Material, Moduli>>(
             input, solid.quadratic_nodes);
-    return std::make_unique<TetrahedraTerm<QuadraticTetrahedron, Material, Moduli, false>>(
-        input, solid.quadratic_nodes);
+    return std::make_unique<TetrahedraTerm<LinearTetrahedron, Material, Moduli>>(input, solid.linear_nodes);
 }
 
 /// Lists an isochoric law under its name, and under "<name> poisson_ratio" for Poisson's ratio in place of the bulk
