@@ -122,8 +122,9 @@ Strains TetrahedraTerm<Element, Material, Moduli>::stress_rates(const double* q,
             volume_rate += volume * state.at[p].volume_rate(along[p]);
         }
         for (int p = 0; p < points; ++p) {
-            if (mean())
-                by[p] += state.volumetric[0].bulk * volume_rate / rest_[group].total() *
+            if constexpr (may_average)
+                if (mean())
+                    by[p] += state.volumetric[0].bulk * volume_rate / rest_[group].total() *
                          rest_[group].volume[p] * state.at[p].volume_piola();
             const SimdMat3 cofactors = cofactor(state.f[p]);
             const SimdDouble inverse = SimdDouble(1.0) / determinant(state.f[p], cofactors);
