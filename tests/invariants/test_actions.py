@@ -58,7 +58,7 @@ def test_internal_forces_and_torques_cancel(name):
         assert np.abs(torque).max() <= 1e-11 * size * EXTENT + 1e-11 * np.abs(directions).sum()
 
 
-RECIPROCAL = ("hanging", "hinged", "loaded", "magnetized", "solid", "actuated", "hanging + actuated")
+RECIPROCAL = ("hanging", "hinged", "loaded", "solid", "actuated", "hanging + actuated")
 
 
 @pytest.mark.parametrize("name", RECIPROCAL)
@@ -69,14 +69,14 @@ def test_linear_responses_are_reciprocal(name):
     at = [np.argmax(x @ (1.0, 0.3, 0.0)), np.argmax(x @ (1.0, -0.3, 0.1))]
     pulls = [ms.PointLoad([vertex], (0.0, 0.0, 0.0), body=body) for vertex in at]
     made.parts["loads"] = pulls  # nothing else pulls
-    made.parts["actuators"] = []
+    made.parts["actuators"] = made.parts["field"] = []
     made.options.pop("gravity", None)
     scene = made.scene()
     forces = 1e-3 * np.array([(0.3, -0.5, 1.0), (-0.2, 0.7, 0.4)])
     answers = [
-        ms.linear_response(scene, field_factor=0.0, support_factor=0.0, values={pull: {"force": force}})[
-            body
-        ].displacements
+        ms.linear_response(scene, support_factor=0.0, values={pull: {"force": force}}).displacements[
+            -len(x) :
+        ]
         for pull, force in zip(pulls, forces, strict=True)
     ]
     there, back = answers[0][at[1]] @ forces[1], answers[1][at[0]] @ forces[0]

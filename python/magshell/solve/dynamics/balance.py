@@ -19,6 +19,7 @@ from ..statics.balance import (
     EnergyBalance,
     above_round_off,
     describe_rest,
+    percent,
     sums_by_name,
     term_kinds,
 )
@@ -26,7 +27,7 @@ from ..statics.balance import (
 if TYPE_CHECKING:
     from .trajectory import Trajectory
 
-_SAME = 1e-6  # [-] of the largest coordinate; see test_balance_of_every_kind_of_motion
+_SAME = 1e-6  # [-] of the largest coordinate; see test_substeps_and_chosen_steps_are_balanced
 
 # Forces that are no terms, in the order of the core's MotionBalance; by their names in a balance.
 _FURTHER = (
@@ -241,7 +242,7 @@ def _warn_of_rest(move: Trajectory, balance: EnergyBalance) -> None:
         return
     # One digit: Python shows a warning once for each place and text, so that a loop over motions does not repeat it.
     worst = balance.rest[np.argmax(np.abs(balance.rest))]
-    what = f"{'made' if worst > 0.0 else 'lost'} {100.0 * balance.rest_fraction:.1g} %"
+    what = f"{'made' if worst > 0.0 else 'lost'} {percent(balance.rest_fraction, 1)} %"
     warning = StepErrorWarning(
         f"the steps of the motion {what} of the largest energy that moved. Take shorter steps; print(motion.balance()) says "
         "where the energy went",

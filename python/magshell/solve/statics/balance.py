@@ -185,13 +185,18 @@ class EnergyBalance:
         return "\n".join([head, f"  {'[J]':<38}{'change':>12}{'range':>12}", *self._lines()])
 
 
+def percent(fraction: float, digits: int) -> str:
+    """Return a fraction in percent with so many digits, without an exponent where it is 100 or more."""
+    return f"{float(f'{100.0 * fraction:.{digits}g}'):.6g}"
+
+
 def describe_rest(balance: EnergyBalance) -> str:
     """Return one sentence on the rest of a balance."""
     rest = balance.rest
     worst = float(rest[np.argmax(np.abs(rest))])
     verb = "made" if worst > 0.0 else "lost"
     return (
-        f"the steps {verb} {abs(worst):.3g} J at most, {100.0 * balance.rest_fraction:.2g} % of the {balance.moved:.3g} J "
+        f"the steps {verb} {abs(worst):.3g} J at most, {percent(balance.rest_fraction, 2)} % of the {balance.moved:.3g} J "
         "that moved"
     )
 
