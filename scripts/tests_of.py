@@ -143,13 +143,17 @@ def fitting(files: list[str], costs: Counter[str], budget: float) -> list[str]:
         spent += cost
     print(f"{len(chosen)} test files, {spent:.0f} s of the processor as measured", file=sys.stderr)
     if left_out:
-        print(f"left out of {budget:.0f} s, the least concerned: {' '.join(left_out[:8])} ...", file=sys.stderr)
+        print(
+            f"left out of {budget:.0f} s, the least concerned: {' '.join(left_out[:8])} ...", file=sys.stderr
+        )
     return chosen
 
 
 def main() -> None:
     """Print the chosen files, one a line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("what", choices=["room", "change"])
     parser.add_argument("name", nargs="?", help="the room, or the commit since which files changed")
     parser.add_argument("--seconds", type=float, help="s of the processor that the files may take together")

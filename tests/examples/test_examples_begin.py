@@ -13,7 +13,9 @@ NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py") if not path.stem.star
 NOTEBOOKS = sorted((EXAMPLES.parent / "notebooks").glob("*.ipynb"))
 
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning", "ignore::magshell.LargeStrainWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::magshell.StepErrorWarning", "ignore::magshell.LargeStrainWarning"
+)
 
 
 class Begun(BaseException):

@@ -100,7 +100,8 @@ def test_listed_tests_are_nightly_with_all_their_parameters(folder):
     (folder / "test_busy.py").write_text(SPUN)
     (folder / "test_other.py").write_text("def test_quick(): pass\ndef test_listed(): pass\n")
     (folder / "seconds.txt").write_text(
-        "# seconds, test\n3.5 test_busy.py::test_spins nightly\n0.5 test_other.py::test_listed\n1.0 test_gone.py::test_gone nightly\n"
+        "# seconds, test\n3.5 test_busy.py::test_spins nightly\n"
+        "0.5 test_other.py::test_listed\n1.0 test_gone.py::test_gone nightly\n"
     )
     assert "8 passed, 2 deselected" in run(folder, "-m", "nightly")
     assert "2 passed, 8 deselected" in run(folder, "-m", "not nightly")

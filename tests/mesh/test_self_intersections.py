@@ -1,6 +1,5 @@
 """Faces that cross each other are found, each pair once; faces that only touch are not."""
 
-
 import numpy as np
 import pytest
 

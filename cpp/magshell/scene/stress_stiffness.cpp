@@ -24,7 +24,7 @@ VectorXd flat(const Strains& strains) {
 }  // namespace
 
 void freeze_stress_rates(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-                       const VectorXd* p) {
+                         const VectorXd* p) {
     model.evaluate(q, load_parameters);
     each_stressed(
         model, [&](StressRateTerm& term, const Term&) { term.freeze_stress_rates(p ? p->data() : nullptr); });

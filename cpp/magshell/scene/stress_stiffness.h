@@ -10,7 +10,7 @@ namespace magshell {
 
 /// Holds the stresses of all terms at their rates as q moves at the rates p of all dofs, or at zero if p is nullptr, until release_stresses().
 void freeze_stress_rates(Model& model, const VectorXd& q, const LoadParameters& load_parameters,
-                       const VectorXd* p);
+                         const VectorXd* p);
 void release_stresses(Model& model);
 
 /// Returns the strain rates J p at q of each term.

@@ -75,7 +75,7 @@ class TendonTerm final : public LowRankTerm, public RestShapeTerm, public Stress
         // Values at the last evaluated state.
         double length = 0.0, tension = 0.0, stiffness = 0.0, extrapolated = 0.0;
         std::vector<Vec3> slopes;  // dL/dx
-        double frozen_rate = 0.0;    // [N] of factor T, while stresses are held at their rates
+        double frozen_rate = 0.0;  // [N] of factor T, while stresses are held at their rates
 
         Vec3 span(const Segment& segment, const double* q) const;
         double length_at(const double* q) const;

@@ -88,7 +88,7 @@ class VolumeTerm final : public LowRankTerm, public RestShapeTerm, public Stress
         // Values at the last evaluated state.
         double volume = 0.0, slope = 0.0, curvature = 0.0, magnitude = 0.0, extrapolated = 0.0;
         std::vector<Vec3> slopes;  // dV/dx
-        double frozen_rate = 0.0;    // [Pa] of dE/dV, while stresses are held at their rates
+        double frozen_rate = 0.0;  // [Pa] of dE/dV, while stresses are held at their rates
 
         /// Returns the positions relative to the first node: the volume does not depend on the origin, and no
         /// digits are lost far from it.

@@ -146,7 +146,8 @@ void JointTerm::evaluate(const double* q, const LoadParameters&, Residual& out) 
     for (std::size_t k = 0; k < each_.size(); ++k) {
         const Each& each = each_[k];
         if (each.act == Act::closure) {
-            const Vec3 pull = frozen_ ? (*frozen_)[k].pull : each.stiffness * gap(each, each.links.positions(q));
+            const Vec3 pull =
+                frozen_ ? (*frozen_)[k].pull : each.stiffness * gap(each, each.links.positions(q));
             each.links.scatter(pull * each.gap.weights.transpose(), out);
             continue;
         }
@@ -181,8 +182,8 @@ void JointTerm::finish_assembly(const double* q, const LoadParameters&, SystemMa
         }
         const State now = state(k, q);
         const double by_first = frozen_ ? (*frozen_)[k].by_first : now.by_first;
-        each.links.add(by_first * now.form.pairs, now.form.first, frozen_ ? 0.0 : now.by_second, now.form.other,
-                       by_first * now.form.cross, out);
+        each.links.add(by_first * now.form.pairs, now.form.first, frozen_ ? 0.0 : now.by_second,
+                       now.form.other, by_first * now.form.cross, out);
     }
 }
 

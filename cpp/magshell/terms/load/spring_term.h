@@ -48,7 +48,9 @@ class SpringTerm final : public DampedTerm, public StressRateTerm {
     void add_forces(const Strains& stresses, Residual& out) override;
     void strains_vjp(const Strains& stresses, Gradient& out) const override;
 
-    void freeze_stress_rates(const double* p) override { frozen_ = p ? strain_rates(p) : Strains(elements(), 1); }
+    void freeze_stress_rates(const double* p) override {
+        frozen_ = p ? strain_rates(p) : Strains(elements(), 1);
+    }
     void release_stresses() override { frozen_.reset(); }
     bool has_stress_work_vjp() const override { return true; }
     void add_stress_work_vjp(const double* q, const Strains& curvatures, Residual& by_q, Gradient& out,
@@ -112,7 +114,7 @@ class SpringTerm final : public DampedTerm, public StressRateTerm {
     static void add_cancelling(const Spring& spring, double stiffness, double beyond, VectorXd& out);
 
     std::vector<Spring> springs_;
-    std::vector<Local> now_;       // at the last evaluated state
+    std::vector<Local> now_;         // at the last evaluated state
     std::optional<Strains> frozen_;  // rates of s while forces are held at their rates
     bool has_lengths_ = false, is_damped_ = false, psd_projection_ = false;
 };

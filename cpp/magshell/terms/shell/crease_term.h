@@ -73,7 +73,8 @@ class CreaseTerm final : public Term, public RestShapeTerm, public StressRateTer
     static double rate(const Edge& edge, const double* q, const double* lambda);
     /// Returns theta - theta_r at the last evaluated state, or the rate of theta that is held.
     double turned(std::size_t k) const {
-        return frozen_ ? frozen_->number(static_cast<Index>(k), 0) : unwrapped_angles_[k] - edges_[k].rest_angle;
+        return frozen_ ? frozen_->number(static_cast<Index>(k), 0)
+                       : unwrapped_angles_[k] - edges_[k].rest_angle;
     }
     /// Returns theta at q with as many full turns as make it nearest to its value at the last evaluated state.
     double unwrapped_angle(const double* q, std::size_t k) const;
@@ -82,7 +83,7 @@ class CreaseTerm final : public Term, public RestShapeTerm, public StressRateTer
     std::vector<Edge> edges_;
     std::vector<double> unwrapped_angles_;  // of each edge at the last evaluated state
     std::vector<double> state_;             // positions there
-    std::optional<Strains> frozen_;           // rates of theta while moments are held at their rates
+    std::optional<Strains> frozen_;         // rates of theta while moments are held at their rates
     bool psd_projection_ = false;
 };
 

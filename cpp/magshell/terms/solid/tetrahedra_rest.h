@@ -61,7 +61,7 @@ inline std::array<SimdVec3, 4> unit_gradients() {
 template <class Element, class Material, class Moduli>
 template <class Rates>
 void TetrahedraTerm<Element, Material, Moduli>::add_work_rest_vjp(const double* q, const Rates& rates,
-                                                                        VectorXd& out) const {
+                                                                  VectorXd& out) const {
     const std::array<SimdVec3, 4> axes = unit_gradients();
     add_rest(out, [&](Index group, SimdMat3 by_deformation[points]) {
         const State state(*this, group, q);
@@ -100,8 +100,7 @@ void TetrahedraTerm<Element, Material, Moduli>::add_work_rest_vjp(const double* 
 
 template <class Element, class Material, class Moduli>
 template <class Rates>
-Strains TetrahedraTerm<Element, Material, Moduli>::stress_rates(const double* q,
-                                                                      const Rates& rates) const {
+Strains TetrahedraTerm<Element, Material, Moduli>::stress_rates(const double* q, const Rates& rates) const {
     const std::array<SimdVec3, 4> axes = unit_gradients();
     Strains out(this->elements(), 6 * points);
     loop_.each_group([&](Index group) {
@@ -125,7 +124,7 @@ Strains TetrahedraTerm<Element, Material, Moduli>::stress_rates(const double* q,
             if constexpr (may_average)
                 if (mean())
                     by[p] += state.volumetric[0].bulk * volume_rate / rest_[group].total() *
-                         rest_[group].volume[p] * state.at[p].volume_piola();
+                             rest_[group].volume[p] * state.at[p].volume_piola();
             const SimdMat3 cofactors = cofactor(state.f[p]);
             const SimdDouble inverse = SimdDouble(1.0) / determinant(state.f[p], cofactors);
             const SimdMat3 second = inverse * transposed_times(cofactors, piola[p]);
@@ -146,9 +145,8 @@ void TetrahedraTerm<Element, Material, Moduli>::freeze_stress_rates(const double
 
 template <class Element, class Material, class Moduli>
 void TetrahedraTerm<Element, Material, Moduli>::add_stress_work_vjp(const double* q,
-                                                                          const Strains& curvatures,
-                                                                          Residual& by_q, Gradient& out,
-                                                                          VectorXd* by_rest) {
+                                                                    const Strains& curvatures, Residual& by_q,
+                                                                    Gradient& out, VectorXd* by_rest) {
     const auto rates = along_strains(curvatures);
     add_forces(stress_rates(q, rates), by_q);
     add_work_vjp(q, rates, out);

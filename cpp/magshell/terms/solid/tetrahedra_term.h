@@ -398,7 +398,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli>, publi
     Strains stress_, extrapolated_;
     ViscousStresses viscous_;
     std::optional<Strains> frozen_;  // V S' while stresses are held at their rates
-    std::vector<double> state_;    // positions of the last evaluated state
+    std::vector<double> state_;      // positions of the last evaluated state
 };
 
 }  // namespace magshell
