@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ROOM_SECONDS, CHANGE_SECONDS = 100.0, 1100.0  # s of the processor: a minute and ten of two processors
 # Tests of the whole, which stand above all rooms.
 ABOVE = ["gradients", "hard", "physics", "examples", "docs", "benchmarks"]
-# What every room depends on counts as all of them.
+# A change of these files counts as one of every room, as all depend on them.
 FOUNDATIONS = ("CMakeLists.txt", "pyproject.toml", "cpp/bindings/")
 
 

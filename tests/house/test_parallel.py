@@ -1,4 +1,4 @@
-"""Which tests are nightly, by the seconds of the processor that they take."""
+"""Tests are nightly by the seconds of the processor that they take."""
 
 import importlib.util
 import shutil

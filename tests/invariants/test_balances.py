@@ -16,7 +16,7 @@ STEPS = {
 }  # of 6 us; of the other methods 80 of 50 us. The shortest waves of the sheets take 0.3 ms.
 FLOOR = 1e-8  # of what moved: the tolerance of the solver, over all steps
 BELOW_ORDER = 0.5  # how much less the order seen may be, at steps that are not infinitely short
-# What is not held, {(what, scene): why}. These tests fail when it is held, so that the table is kept true.
+# The table of what is not held, {(what, scene): why}. These tests fail when it is held, so that the table is kept true.
 BEING_MENDED = {
     ("energy", "with_added_mass"): "added mass has no energy (DESIGN 2.19)",
     ("angular momentum", "rubbing"): "friction between bodies makes a torque (DESIGN 2.17)",

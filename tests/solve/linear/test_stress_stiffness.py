@@ -62,7 +62,7 @@ def test_a_plate_under_pressure_does_not_buckle():
 
 
 def test_stiffness_of_stresses_about_an_equilibrium_is_that_of_the_remaining_load():
-    """Buckle from half of the load on: the way to the whole one buckles after 2 EULER - 1 of it."""
+    """Check buckling from half of the load on: the way to the whole one buckles after 2 EULER - 1 of it."""
     scene = column(0.0)
     half = ms.equilibrium(scene, load_factor=0.5 * EULER)
     found = ms.linear_buckling(scene, half, load_factor=EULER).factors[0]
