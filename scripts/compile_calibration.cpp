@@ -1,5 +1,5 @@
-// The measure with which scripts/compile_seconds.py compares each unit: some Eigen and some loops, as in the core. It includes nothing
-// of magshell, so it takes the same share of a compiler's time in every release. Nothing calls it.
+// scripts/compile_seconds.py compares the time of each unit with that of this file: some Eigen and some loops, as in the core. It includes
+// nothing of magshell, so it takes the same time in every release. Nothing calls it.
 #include <Eigen/Core>
 #include <algorithm>
 #include <map>

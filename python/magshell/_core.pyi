@@ -65,6 +65,7 @@ __all__: list[str] = [
     "fine_face_points",
     "first_order_change",
     "follow_path",
+    "freeze_stress_rates",
     "keeps_energy",
     "kinds_of_terms",
     "lane_angles",
@@ -88,6 +89,7 @@ __all__: list[str] = [
     "push_forward",
     "push_forward_motion",
     "rasterized",
+    "release_stresses",
     "sample_fields",
     "set_num_threads",
     "shape_friction",
@@ -97,11 +99,14 @@ __all__: list[str] = [
     "solid_point_states",
     "solve_with_operator",
     "state_on_joints",
+    "strain_rates",
+    "stress_work_vjp",
     "term_gradients",
     "touching_pairs",
     "vacuum_permeability",
     "vjp",
     "without_rest_gradient",
+    "without_stress_work_vjp",
 ]
 
 class FactorReport:
@@ -1318,6 +1323,16 @@ def follow_path(
     until: typing.Any = None,
     progress: typing.Any = None,
 ) -> PathResult: ...
+def freeze_stress_rates(
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    motion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"] | None,
+) -> None:
+    """
+    Hold the stresses of all terms at their rates along a motion of all unknowns (n,) from q, or at zero, until release_stresses: Hessians are then those of these stresses.
+    """
+
 def keeps_energy(model: Model) -> bool:
     """
     Whether all forces of the scene, without damping, have a potential.
@@ -1562,6 +1577,11 @@ def rasterized(
     Paints triangles into an image (height, width, 4). surfaces: dictionaries with positions (n, 3) m on the screen and in depth, faces, colors, per_face, lit, crease (degrees) and opacity. window: (left, right, bottom, top) m.
     """
 
+def release_stresses(model: Model) -> None:
+    """
+    Let stresses follow from strains again.
+    """
+
 def sample_fields(
     fields: collections.abc.Sequence[AppliedField],
     scales: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
@@ -1648,6 +1668,27 @@ def state_on_joints(
     A state with its rigid parts on their joints as the values are now, the increments from there to what motors and supports prescribe, and forces of all unknowns on the free ones there.
     """
 
+def strain_rates(
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    motion: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]]:
+    """
+    The rates of the strains of each energy that has a stress, [(k,)], along a motion of all unknowns (n,) from q.
+    """
+
+def stress_work_vjp(
+    model: Model,
+    q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    curvatures: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]],
+    by_rest: bool = False,
+) -> tuple[typing.Any, ...]:
+    """
+    The derivatives of the stresses at q times fixed strain curvatures, as strain_rates has them: by all unknowns, by every value, by the load parameters, and, if by_rest, by the rest shape, three numbers per node, else none.
+    """
+
 def term_gradients(
     model: Model,
     q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
@@ -1666,7 +1707,7 @@ def touching_pairs(
     v: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
 ) -> dict[str, typing.Any]:
     """
-    Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) [N], forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the first part, friction_forces (n, 3) [N] on it and sliding_velocities (n, 3) [m/s] of it.
+    Pairs of bodies in contact: contacts (n,), pairs (n, 4), distances (n,) [m], normal_forces (n,) [N], forces (n, 4, 3) [N], weights (n, 4) of the difference of the closest points, normals (n, 3) on the first part, friction_forces (n, 3) [N] on it and sliding_velocities (n, 3) [m/s] of it; vertex_friction_forces (n, 5, 3) [N] on slip_vertices (n, 5), which have no moment.
     """
 
 def vjp(
@@ -1683,6 +1724,11 @@ def vjp(
 def without_rest_gradient(model: Model) -> list[typing.Any]:
     """
     The names of the energies and forces that have no derivative by rest positions.
+    """
+
+def without_stress_work_vjp(model: Model) -> list[typing.Any]:
+    """
+    The names of the energies whose stress rates stress_work_vjp leaves out.
     """
 
 __version__: str = "0.1.0"
