@@ -22,7 +22,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 ROOM_SECONDS, CHANGE_SECONDS = 100.0, 1100.0  # s of the processor: a minute and ten of two processors
 # Tests of the whole, which stand above all rooms.
-ABOVE = ["gradients", "hard", "physics", "examples", "docs", "benchmarks"]
+ABOVE = ["gradients", "invariants", "hard", "physics", "examples", "docs", "benchmarks"]
 # A change of these files counts as one of every room, as all depend on them.
 FOUNDATIONS = ("CMakeLists.txt", "pyproject.toml", "cpp/bindings/")
 

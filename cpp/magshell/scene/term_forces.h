@@ -23,6 +23,14 @@ class TermForces {
         return name == "contact" || name == "body contact" || name == "friction" || name == "body friction";
     }
 
+    /// Returns 1 for each node of a rigid part, 0 for the others.
+    std::vector<char> nodes_of_rigid_parts() const {
+        std::vector<char> found(model_.nodes().n_nodes(), 0);
+        for (const std::vector<Index>& part : model_.bodies().rigid_nodes())
+            for (const Index node : part) found[node] = 1;
+        return found;
+    }
+
     /// Calls add(row, gradient) with minus the force of each term [N] in a stage that ends at q. The model is linearized at q, and has the
     /// values and angle branches of that state.
     template <class Add>

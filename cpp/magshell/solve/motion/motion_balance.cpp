@@ -43,9 +43,7 @@ class Accountant {
           terms_(model) {
         sums_ = BalanceRows::Zero(terms_.rows() + MotionBalance::further_forces, 7);
         driven_ = VectorXd::Zero(terms_.energies());
-        is_rigid_.assign(model.nodes().n_nodes(), 0);
-        for (const std::vector<Index>& body : model.bodies().rigid_nodes())
-            for (const Index node : body) is_rigid_[node] = 1;
+        is_rigid_ = terms_.nodes_of_rigid_parts();
     }
 
     Stepper& stepper() { return stepper_; }

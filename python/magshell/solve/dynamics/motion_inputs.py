@@ -153,7 +153,7 @@ class MotionInputs:
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether no force puts energy in or takes it out: all have potentials, nothing is damped or changes in time."""
+        """Tell whether no force puts energy in or takes it out: all have potentials, none is damped or changes in time."""
         law, rows = self._law, self._rows
         is_damped = self._damping.any() or law["stiffness_damping"] != 0.0 or len(law["maxwell_modulus"]) > 0
         return (
