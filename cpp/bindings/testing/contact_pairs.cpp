@@ -316,7 +316,8 @@ void register_contact_pairs(py::module_& module) {
     module.def("pair_frictions", &frictions, py::arg("kind"), py::arg("places"), py::arg("area"),
                py::arg("parallel"), py::arg("law"), py::arg("velocities"), py::arg("friction"),
                py::arg("lambda_"),
-               "force (n, 5, 3) and slip (n, 3) of pairs that act, with friction = (kinetic, fixed, sticking speed), its "
+               "force (n, 5, 3) and slip (n, 3) of pairs that act, with friction = (kinetic, fixed, sticking "
+               "speed), its "
                "derivatives, and "
                "those of lambda . force.");
     py::class_<BroadPhase>(module, "BroadPhase")
