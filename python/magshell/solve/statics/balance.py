@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ...model.scene.scene import Scene
     from .path import EquilibriumPath
 
+_OF_FLIGHT = 0.01  # [-] of a kinetic energy that counts as moved though it stays the same
 LARGEST_REST = 0.05  # [-] of the largest energy that moved; see test_rest_of_a_coarse_motion_is_warned_of
 
 _ROUND_OFF = 1e-12  # [-] of the largest row; see test_fixed_supports_have_impulses_and_no_work
@@ -129,9 +130,11 @@ class EnergyBalance:
     @property
     def moved(self) -> float:
         """The largest energy that moved, in J: the largest range of one of the energies, works and losses over the
-        states."""
+        states, and at least a hundredth of the largest kinetic energy, as a body that only flies exchanges none.
+        """
         rows = [*self.energies.values(), *self.work.values(), *self.dissipation.values()]
-        return max((float(np.ptp(row)) for row in rows), default=0.0)
+        kinetic = self.energies.get("kinetic", np.zeros(1))
+        return max(_OF_FLIGHT * float(np.abs(kinetic).max()), *(float(np.ptp(row)) for row in rows), 0.0)
 
     @property
     def rest_fraction(self) -> float:
