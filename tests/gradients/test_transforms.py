@@ -6,6 +6,7 @@ import pytest
 import magshell as ms
 
 torch = pytest.importorskip("torch")
+pytestmark = pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")
 make_fx = pytest.importorskip("torch.fx.experimental.proxy_tensor").make_fx
 
 MESH = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))

@@ -36,6 +36,8 @@ class Sample:
         self.scene = ms.Scene(self.shell, supports=[self.clamp], loads=[self.load], gravity=(0, 0, -0.1))
         field = [ms.UniformField(), self.dipoles, self.grid]
         self.magnetic = ms.Scene(self.shell, supports=[self.clamp], loads=[self.load], field=field)
+        press = ms.EdgeLoad(self.mesh.edges_at(x=self.mesh.rest_positions[:, 0].max()), (-0.01, 0.0, 0.0))
+        self.pressed = ms.Scene(self.shell, supports=[self.clamp], loads=[press], field=field)
         self.magnetization = np.tile((1e4, 0.0, 2e3), (self.mesh.n_faces, 1))
         self.field = np.array((0.0, 0.0, 1e-3))
         self.rest = ms.equilibrium(self.scene)
@@ -319,7 +321,7 @@ def _solves(s: Sample) -> Iterator[Call]:
     yield Call("linear_response", ms.linear_response, {**magnetic, "equilibrium": None})
     of_members = {**magnetic, "applied_flux_density": fields, "batch": 2, "threads": 1}
     yield Call("linear_response of a batch", ms.linear_response, of_members)
-    yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "equilibrium": None, "modes": 1}, cost=2)
+    yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "scene": s.pressed, "equilibrium": None, "modes": 1}, cost=2)
     modes = {"scene": s.scene, "equilibrium": s.rest, "count": 2, "mass": "consistent"}
     yield Call("vibration_modes", ms.vibration_modes, modes, cost=2)
     viscous = {

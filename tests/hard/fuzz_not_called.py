@@ -2,6 +2,8 @@
 
 NOT_CALLED = {
     "Buckling": "a result",
+    "EnergyBalance": "a result",
+    "MotionBalance": "a result",
     "CriticalPoint": "a result",
     "DesignRejected": "an error",
     "EquilibriumJumped": "an error",

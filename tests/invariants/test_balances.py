@@ -20,10 +20,6 @@ BELOW_ORDER = 0.5  # how much less the order seen may be, at steps that are not 
 NOT_HELD = {
     (
         "energy",
-        "spinning_top",
-    ): "a free rigid body leaves 1e-7 of what moved, which falls with the first order",
-    (
-        "energy",
         "on_springs",
     ): "a free rigid body leaves 1e-6 of what moved, which falls slower than the second order",
     ("energy", "with_added_mass"): "added mass has no energy (DESIGN 2.19)",

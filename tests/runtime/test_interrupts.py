@@ -32,7 +32,8 @@ class Caller:
 def scene_of(caller, **changes):
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, mass_density=1e3)
     field = ms.CustomField(caller.field, length_scale=0.05)
-    return ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], field=field, **changes)
+    press = ms.EdgeLoad(MESH.edges_at(x=0.05), (-0.01, 0.0, 0.0))
+    return ms.Scene(sheet, supports=[ms.Clamp(MESH.edges_at(x=0.0))], loads=[press], field=field, **changes)
 
 
 def simulate(scene, **options):

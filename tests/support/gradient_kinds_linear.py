@@ -154,7 +154,7 @@ def buckling_six_node_column() -> Kind:
     press = ms.EdgeLoad(mesh.edges_at(x=0.1), (-0.1, 0.02, 1e-3))
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[press], gravity=(-9.81, 1.0, 0))
     return Kind(
-        scene, {"load_factor": 0.9, "gravity_factor": 0.8}, solve=buckling, reach=REACH, of_linear=True
+        scene, {"load_factor": 0.9, "gravity_factor": 0.8}, solve=buckling, reach=REACH, keeps_shape=True
     )
 
 

@@ -55,14 +55,14 @@ def tied_sheet_at_rest(six: bool) -> Kind:
     scene = ms.Scene(sheet, supports=supports, field=[ms.UniformField(), DIPOLES], gravity=(0.3, 0.2, -1.0))
     inputs = {"applied_flux_density": (1e-3, 0.0, 2e-3), "gravity_factor": 0.9, "support_factor": 0.8}
     inputs["remanent_magnetization"] = (2e4, 0.0, 1e4)
-    return Kind(scene, inputs, fixed=EXACT, reach=REACH, keeps_shape=True)
+    return Kind(scene, inputs, fixed=EXACT, reach=REACH)
 
 
 def tied_solid_at_rest() -> Kind:
     solid, supports = _solid()
     scene = ms.Scene(solid, supports=supports, gravity=(0.3, 0.2, -9.81))
     return Kind(
-        scene, {"gravity_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, reach=REACH, keeps_shape=True
+        scene, {"gravity_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, reach=REACH
     )
 
 
@@ -75,7 +75,7 @@ def tied_in_motion(integrator, solid: bool, **options) -> Kind:
         "gravity_factor": np.linspace(0.5, 1.0, 4),
         "velocities": 1e-2 * RNG.standard_normal((body.mesh.n_vertices, 3)),
     }
-    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=3, keeps_shape=True)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=1e-5, reach=REACH, in_time=3)
 
 
 TIE_MAKERS = {

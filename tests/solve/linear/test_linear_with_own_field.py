@@ -6,6 +6,7 @@ import scipy
 from current_strip import BendingStrip
 
 import magshell as ms
+from magshell.solve.adjoint.stress_stiffness import frozen_stress_rates
 from magshell.solve.adjoint.factorized import Factorized, stiffness_parts
 from magshell.solve.linear.stiffness import symmetric
 from magshell.solve.linear.vibration import consistent_masses
@@ -217,16 +218,14 @@ def dense_factors(rest, load_factor):
     """Return all positive factors of the way to a load factor, ascending, by a decomposition of dense matrices."""
     scene, model = rest.scene, rest.scene._model
     response = ms.linear_response(scene, rest, load_factor=load_factor)
-    step = 1e-6 / np.abs(response.displacements).max()
     along = model.state(
         scene.mesh.rest_positions + response.displacements, np.asarray(response.edge_rotations)
     ) - model.state(scene.mesh.rest_positions, np.zeros(scene._bodies.n_rotations))
-    to = response._load_parameters
-    ahead, behind = (
-        dense_stiffness(rest, rest._load_parameters + t * (to - rest._load_parameters), t * along)
-        for t in (step, -step)
-    )
-    inverses = scipy.linalg.eigh(-(ahead - behind) / (2 * step), dense_stiffness(rest), eigvals_only=True)
+    with frozen_stress_rates(model, rest._state, rest._load_parameters, along):
+        after = dense_stiffness(rest, response._load_parameters)
+    with frozen_stress_rates(model, rest._state, rest._load_parameters, None):
+        before = dense_stiffness(rest)
+    inverses = scipy.linalg.eigh(before - after, dense_stiffness(rest), eigvals_only=True)
     return 1.0 / inverses[inverses > 0.0][::-1]
 
 
@@ -243,7 +242,8 @@ def test_modes_where_the_own_field_alone_holds_a_strip():
         ms.vibration_modes(scene, pressed, count=3).squares, dense_squares(pressed)[:3], rtol=1e-8
     )
     found = ms.linear_buckling(scene, pressed, load_factor=factor, modes=2).factors
-    assert found[0] == pytest.approx(1.0, rel=1e-3)  # what happens before buckling is not quite linear
+    # Linear theory leaves out how the displacement before buckling changes the stiffness of the own field: 0.8 %.
+    assert found[0] == pytest.approx(1.0, rel=1e-2)
     np.testing.assert_allclose(found, dense_factors(pressed, factor)[:2], rtol=1e-5)
 
 

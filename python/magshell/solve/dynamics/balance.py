@@ -53,7 +53,7 @@ _INTERNAL = (
 class MotionBalance(EnergyBalance):
     """The balance of energy, momentum and angular momentum of a motion, in its n recorded states.
 
-    parameters: (n,) s, the times. momentum: (n, 3) N s; angular_momentum: (n, 3) N m s, about the origin. impulses,
+    parameters: (n,) s, the times. energies, work, dissipation: as in EnergyBalance. momentum: (n, 3) N s; angular_momentum: (n, 3) N m s, about the origin. impulses,
     angular_impulses: {name: (n, 3)}, of supports, loads, fields, contact with obstacles and other forces from outside
     since the first state. Forces between the parts of a scene have none, so that `momentum_rest` and
     `angular_momentum_rest` show it if they do not cancel.
@@ -217,7 +217,7 @@ def rest_of_energy(move: Trajectory) -> EnergyBalance | None:
     if not move._keeps_energy:
         return None
     return EnergyBalance(
-        move.times, {"kinetic": move.kinetic_energy, **move.energies}, {}, {}, _coordinate="time [s]"
+        move.times, {"kinetic": move._kinetic_energy, **move._energies}, {}, {}, _coordinate="time [s]"
     )
 
 
@@ -226,7 +226,7 @@ def describe_energy(move: Trajectory) -> str:
     known = vars(move).get("_balance") or rest_of_energy(move)
     if known is not None and np.isfinite(known.rest).all():
         return f"energy: {describe_rest(known)}"
-    energy = move.energy
+    energy = move._kinetic_energy + sum(move._energies.values())
     return f"energy: {energy[0]:.4g} J at first, {energy[-1]:.4g} J at last; balance() says where it came from and went"
 
 

@@ -108,6 +108,15 @@ class EnergyBalance:
     positive where they made energy, negative where they lost it.
 
     parameters: (n,) of a path, or the times (n,) s of a motion.
+
+    >>> import magshell as ms
+    >>> mesh = ms.meshes.rectangle(0.05, 0.01, cells=(10, 2))
+    >>> sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    >>> pull = ms.EdgeLoad(mesh.edges_at(x=0.05), (0, 0, 0.01))
+    >>> scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[pull])
+    >>> balance = ms.follow_path(scene, progress=False).balance()
+    >>> sorted(balance.energies), "loads" in balance.work, balance.rest_fraction < 0.05
+    (['elastic'], True, True)
     """
 
     parameters: np.ndarray
