@@ -77,6 +77,7 @@ def test_truth_has_the_range_it_should() -> None:
     assert (lengths >= 35e3).all() and (lengths <= 45e3).all()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_pictures_and_summary(identified, tmp_path) -> None:
     example = load("identify")
     example.plot(identified).savefig(tmp_path / "identify.png")

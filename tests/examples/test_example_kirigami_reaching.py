@@ -44,6 +44,7 @@ def test_each_cell_has_three_variables(reaching) -> None:
     assert reaching["variables"] == 3 * 13
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning", "ignore::magshell.StepErrorWarning")
 def test_pictures_and_summary(reaching, tmp_path) -> None:
     example = load("kirigami_reaching")
     example.plot(reaching).savefig(tmp_path / "reaching.png")

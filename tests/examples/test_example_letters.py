@@ -21,6 +21,7 @@ def designs():
     return designs
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_every_variant_lowers_the_objective(letter) -> None:
     for design in letter["designs"].values():
         values = [record.objective for record in design.history]

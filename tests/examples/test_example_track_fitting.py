@@ -81,6 +81,7 @@ def test_errors_in_time_of_both_integrators(tracks) -> None:
         assert by_method["spline"].time_error > 3 * by_method["ours"].time_error
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_pictures_and_summary(tracks, tmp_path) -> None:
     example = load("track_fitting")
     example.plot(tracks).savefig(tmp_path / "tracks.png")

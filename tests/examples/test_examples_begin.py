@@ -31,6 +31,7 @@ def _solves_end_at_their_first_report(monkeypatch) -> None:
     monkeypatch.setattr(tqdm.tqdm, "update", report)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_begins(name: str) -> None:
     with pytest.raises(Begun):

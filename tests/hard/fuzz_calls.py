@@ -321,7 +321,12 @@ def _solves(s: Sample) -> Iterator[Call]:
     yield Call("linear_response", ms.linear_response, {**magnetic, "equilibrium": None})
     of_members = {**magnetic, "applied_flux_density": fields, "batch": 2, "threads": 1}
     yield Call("linear_response of a batch", ms.linear_response, of_members)
-    yield Call("linear_buckling", ms.linear_buckling, {**magnetic, "scene": s.pressed, "equilibrium": None, "modes": 1}, cost=2)
+    yield Call(
+        "linear_buckling",
+        ms.linear_buckling,
+        {**magnetic, "scene": s.pressed, "equilibrium": None, "modes": 1},
+        cost=2,
+    )
     modes = {"scene": s.scene, "equilibrium": s.rest, "count": 2, "mass": "consistent"}
     yield Call("vibration_modes", ms.vibration_modes, modes, cost=2)
     viscous = {

@@ -115,6 +115,7 @@ def test_an_affine_boundary_makes_an_affine_sheet(seed, ratio, gradient):
     assert np.abs(found.positions - deformed).max() < 1e-8
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @some
 @given(seed=SEEDS, exponent=st.integers(-6, 6))
@@ -166,6 +167,7 @@ def test_the_order_of_a_scenes_parts_does_not_matter(seed, order):
 # Motions
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @some
 @given(seed=SEEDS, bending=BENDINGS, speed=st.tuples(*[st.floats(-3, 3)] * 3))
@@ -274,6 +276,7 @@ def test_a_motion_run_backwards_comes_back_as_steps_get_shorter(seed, bending):
     assert fine < 0.02 and fine < 0.5 * coarse + 1e-4
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @some
 @given(

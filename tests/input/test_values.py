@@ -30,6 +30,7 @@ SOLVES = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("name", SOLVES)
 def test_keywords_are_short_forms_to_the_last_bit(name):
     solve = SOLVES[name]
@@ -44,6 +45,7 @@ def test_keywords_are_short_forms_to_the_last_bit(name):
     assert np.array_equal(mixed, short)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("name", ("equilibrium", "warm start", "simulate"))
 def test_material_has_short_forms_too(name):
     given = {"young_modulus": 1.2e6, "thickness": 1.1e-3}
@@ -83,6 +85,7 @@ def test_load_cases_and_gradients_come_through_values():
     assert torch.equal(*found) and found[0].abs().max() > 0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LinearTheoryWarning")
 def test_linear_theory_and_vibrations_take_values_of_objects():
     """Compare with a scene that was built with these values."""
     thick = ms.Shell(MESH, thickness=2e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)

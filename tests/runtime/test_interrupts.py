@@ -66,6 +66,7 @@ SOLVES = {
 }
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("name", SOLVES)
 def test_interrupt_at_every_call(name):
     kind, make = SOLVES[name]
@@ -112,6 +113,7 @@ def test_a_motion_goes_on_from_wherever_it_was_stopped(options):
             np.testing.assert_array_equal(after.times, whole.times[before.steps_done :])
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_rotations_that_are_still_to_be_put_to_rest_are_saved_so(tmp_path):
     caller = Caller()
     scene = scene_of(caller)

@@ -61,9 +61,7 @@ def tied_sheet_at_rest(six: bool) -> Kind:
 def tied_solid_at_rest() -> Kind:
     solid, supports = _solid()
     scene = ms.Scene(solid, supports=supports, gravity=(0.3, 0.2, -9.81))
-    return Kind(
-        scene, {"gravity_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, reach=REACH
-    )
+    return Kind(scene, {"gravity_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, reach=REACH)
 
 
 def tied_in_motion(integrator, solid: bool, **options) -> Kind:

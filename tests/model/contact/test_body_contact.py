@@ -101,6 +101,7 @@ def test_upper_sheet_rests_on_the_lower_with_its_full_weight():
     assert rest.contact_state(touch).forces[PLATE.n_vertices :].sum(0)[2] == pytest.approx(weight, rel=1e-8)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()])
 def test_ball_falls_onto_a_sheet_and_never_through(integrator):
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(6, 6))
@@ -181,6 +182,7 @@ def test_a_step_over_many_edges_stops_before_a_sheet(height):
     assert lowest(_core.moved(model, q, q - end)) == pytest.approx(lowest(q) + 0.9 * 3.0)  # a free path
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("lagged", [False, True])
 @pytest.mark.parametrize("slope, slides", [(0.3, False), (0.7, True)])
 def test_block_on_a_slope_sticks_or_slides(slope, slides, lagged):
@@ -303,6 +305,7 @@ def test_supports_that_push_bodies_through_each_other_raise_an_error():
         ms.equilibrium(scene)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 def test_relaxation_that_ends_early_reports_contacts():
     touching = two_sheets(height=1.03e-3)

@@ -19,6 +19,7 @@ def borne(lower, upper):
     return compute_contact_state(scene, scene._values, touch, scene._model.rest_state()).normal_force
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("below", [4, 16])
 @pytest.mark.parametrize("on_top", [4, 16])
 @pytest.mark.parametrize("aside", [(0, 0), (3e-4, 2e-4)])
@@ -38,6 +39,7 @@ def upright(cells, aside, low):
     return ms.TriangleMesh(np.stack(points, axis=1), mesh.faces)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_edges_that_cross_bear_in_proportion_to_the_area_of_their_faces():
     """Check that the force of crossing edges scales with the area of their faces.
 

@@ -22,6 +22,7 @@ def thrown_down(scene: ms.Scene, speed: float, steps: int) -> ms.Trajectory:
     )
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("friction", [None, 0.6])
 def test_an_impact_takes_few_factorizations(friction):
     """Check that an impact takes at most 12 factorizations.
@@ -38,6 +39,7 @@ def test_an_impact_takes_few_factorizations(friction):
     assert np.all(motion.positions[-1, :, 2] > -1.1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_landing_body_does_not_penetrate_the_body_on_it():
     lower = ms.meshes.rectangle(0.02, 0.02, cells=(6, 6), irregular=0.2)

@@ -91,6 +91,7 @@ def test_moving_supports_exert_the_inertia_forces(damping):
     assert np.isnan(motion.reaction(moved, 0).force).all()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_friction_of_sliding_bodies_is_the_coefficient_times_the_normal_force():
     """Check a sheet sliding over another, whose pins bear the forces between them."""
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.09e-3)
@@ -115,6 +116,7 @@ def test_friction_of_sliding_bodies_is_the_coefficient_times_the_normal_force():
     np.testing.assert_allclose(motion.reaction(held).force + weight(scene).sum(axis=0), own, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_friction_of_sticking_bodies_stays_below_the_limit():
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.09e-3)
     held = ms.Pin(np.arange(PLATE.n_vertices), body=lower)
@@ -158,6 +160,7 @@ def test_forces_of_obstacles_balance_weight_and_inertia():
     assert not touched.friction_force.any() and not touched.friction_ratios.any()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_obstacles_are_asked_with_points_on_faces():
     scene = block_on(ms.obstacles.Sphere(0.05, center=(0.01, 0.01, -0.0501)), face_samples=3)
     motion = simulated(scene, 10, 1e-3)
@@ -194,6 +197,7 @@ def roof(angle):
     return ms.TriangleMesh(points, mesh.faces)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("angle, aside, sharp", [(1.0, 0.0, True), (1.0, 3e-3, False), (0.2, 0.0, False)])
 def test_ridge_of_the_other_surface_makes_a_nonsmooth_vertex(angle, aside, sharp):
     """Place the corner of a tile over a ridge, at or beside the border between its face and its edge."""
@@ -218,6 +222,7 @@ def test_ridge_of_the_other_surface_makes_a_nonsmooth_vertex(angle, aside, sharp
         np.testing.assert_array_equal(motion.nonsmooth_vertices[0], [lower.mesh.n_vertices])
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_opening_and_closing_of_a_contact_is_smooth():
     """Drop the middle of a sheet on a plate: it touches and leaves again."""
     mesh = ms.meshes.rectangle(0.06, 0.06, cells=(3, 3)).transformed(translation=(-0.02, -0.02, 0))

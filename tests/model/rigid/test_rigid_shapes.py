@@ -21,6 +21,7 @@ def cube(height=6e-4, **moved):
     return CUBE.transformed(translation=(7.3e-3, 8.1e-3, height), **moved)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_a_cube_rests_on_a_plate():
     part = ms.RigidBody.of(cube(), 2e3)
     scene = on_plate(part)
@@ -36,6 +37,7 @@ def test_a_cube_rests_on_a_plate():
     assert held[2] == pytest.approx(weight + 9.81 * masses, rel=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()])
 def test_a_cube_falls_slides_and_stops(integrator):
     """Check a sliding cube, which friction stops in v/(mu g)."""
@@ -52,6 +54,7 @@ def test_a_cube_falls_slides_and_stops(integrator):
     assert min(motion.contact_state(touch, k).smallest_distance for k in range(41)) > 5e-4
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_shapes_of_rigid_bodies_collide():
     """Check two cubes in free flight: momentum is conserved, and they separate again."""
     a = ms.RigidBody.of(cube(0.0), 1e3, velocity=(0.1, 0, 0))
@@ -145,6 +148,7 @@ def test_gradients_go_through():
         assert float((leaf.grad * torch.as_tensor(step)).sum()) == pytest.approx(float(differences), rel=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_link_touches_with_its_shape():
     """Check that a pendulum that swings onto a held plate stays on its side."""
     plate = ms.Shell(PLATE, **SOFT)
@@ -162,6 +166,7 @@ def test_a_link_touches_with_its_shape():
     assert motion[arm].center[-1][2] < arm.center[2] - 3e-4
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning", "ignore::magshell.StepErrorWarning")
 def test_pictures_show_rigid_shapes(tmp_path):
     part = ms.RigidBody.of(cube(), 2e3)
     scene = on_plate(part)

@@ -32,6 +32,7 @@ def test_factors_of_a_column_scale_as_modulus_and_cube_of_thickness():
         assert powers[1:] == pytest.approx([1.0, -1.0], rel=1e-7)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LinearTheoryWarning")
 @pytest.mark.parametrize("bent", [False, True])
 def test_factors_have_the_gradients_of_differences(bent):
     scene = column(gravity=(0, 0, -0.05))

@@ -6,8 +6,8 @@ import scipy
 from current_strip import BendingStrip
 
 import magshell as ms
-from magshell.solve.adjoint.stress_stiffness import frozen_stress_rates
 from magshell.solve.adjoint.factorized import Factorized, stiffness_parts
+from magshell.solve.adjoint.stress_stiffness import frozen_stress_rates
 from magshell.solve.linear.stiffness import symmetric
 from magshell.solve.linear.vibration import consistent_masses
 

@@ -69,6 +69,7 @@ def test_stiffness_of_stresses_about_an_equilibrium_is_that_of_the_remaining_loa
     assert found == pytest.approx(2.0 * ms.linear_buckling(scene).factors[0] / EULER - 1.0, rel=1e-3)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LinearTheoryWarning")
 @pytest.mark.parametrize(
     ("ratio", "materials"),
     [

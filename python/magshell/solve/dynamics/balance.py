@@ -53,10 +53,10 @@ _INTERNAL = (
 class MotionBalance(EnergyBalance):
     """The balance of energy, momentum and angular momentum of a motion, in its n recorded states.
 
-    parameters: (n,) s, the times. energies, work, dissipation: as in EnergyBalance. momentum: (n, 3) N s; angular_momentum: (n, 3) N m s, about the origin. impulses,
-    angular_impulses: {name: (n, 3)}, of supports, loads, fields, contact with obstacles and other forces from outside
-    since the first state. Forces between the parts of a scene have none, so that `momentum_rest` and
-    `angular_momentum_rest` show it if they do not cancel.
+    parameters: (n,) s, the times. energies, work, dissipation: as in EnergyBalance.
+    momentum: (n, 3) N s; angular_momentum: (n, 3) N m s, about the origin. impulses, angular_impulses: {name: (n, 3)}, of
+    supports, loads, fields, contact with obstacles and other forces from outside since the first state. Forces between the
+    parts of a scene have none, so that `momentum_rest` and `angular_momentum_rest` show it if they do not cancel.
 
     The sums are those that the integrator itself would give for the work and the impulses as further unknowns, so each has
     its order. The momentum is balanced up to the tolerance of the solver.
