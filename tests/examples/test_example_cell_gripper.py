@@ -83,7 +83,10 @@ def test_the_environment_moves_as_the_motion_does(lifted) -> None:
     one = environment(levels=7, ball_cells=2, disturbed=False)
     one.reset(seed=0)
     seen = [one.step(action)[0] for action in controls]
-    np.testing.assert_allclose(seen[-1][:3], gripper.displacement(gripper.motion(controls)), atol=1e-12)
+    # A motion that is resumed takes other iterations where friction acts, and they end at a tolerance of 1e-4.
+    np.testing.assert_allclose(
+        seen[-1][:3], gripper.displacement(gripper.motion(controls)), rtol=1e-3, atol=1e-8
+    )
 
 
 def test_pictures_of_the_gripper(lifted, tmp_path, monkeypatch) -> None:
