@@ -1,6 +1,7 @@
 """Every example and notebook builds its scene and takes a first solve or iteration; nightly tests compare their results."""
 
 import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import nbformat
@@ -22,6 +23,12 @@ pytestmark = pytest.mark.filterwarnings(
 
 class Begun(BaseException):
     """Ends an example as soon as a solve or a search reports progress: a solve at its end at the latest."""
+
+
+@pytest.fixture(autouse=True)
+def _figures_are_closed() -> Iterator[None]:
+    yield
+    pyplot.close("all")
 
 
 @pytest.fixture(autouse=True)
@@ -48,4 +55,3 @@ def test_a_notebook_begins(path: Path, monkeypatch) -> None:
         for cell in nbformat.read(path, as_version=4).cells:
             if cell.cell_type == "code":
                 exec(compile(cell.source, str(path), "exec"), names)
-    pyplot.close("all")

@@ -20,9 +20,11 @@ from gradient_net import (
     size_of,
     unit,
 )
-from gradient_scenes import admissible, label, subject, subjects
+from gradient_scenes import OF_SMALL_SCENES, admissible, label, subject, subjects
 
 import magshell as ms
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 PRECISION = 2e-5  # of the steepest slope
 PRECISION_OF_ONE = 1e-3  # of the share of one input in the slope along the one direction

@@ -6,12 +6,14 @@ from gradient_kinds import MAKERS, kind
 from gradient_kinds_batch import BATCH_MAKERS
 from gradient_kinds_linear import LINEAR_MAKERS
 from gradient_kinds_shapes import FORCES
-from gradient_scenes import admissible, label
+from gradient_scenes import OF_SMALL_SCENES, admissible, label
 from test_tangents import results_of
 
 import magshell as ms
 
 torch = pytest.importorskip("torch")
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 
 def has_hessian(name):

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 from gradient_kinds import MAKERS, kind
-from gradient_scenes import label
+from gradient_scenes import OF_SMALL_SCENES, label
 
 import magshell as ms
 
 torch = pytest.importorskip("torch")
 from both_modes import by_both_modes, direction  # noqa: E402
 from torch.autograd import forward_ad  # noqa: E402
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 LARGE, FAST = 1e-3, 1e-1  # m and m/s, of meshes of 0.1 m
 IN_MOTION = [name for name in MAKERS if kind(name).function is ms.simulate]

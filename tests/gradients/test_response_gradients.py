@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from gradient_kinds import MAKERS, kind
 from gradient_kinds_linear import as_values
-from gradient_scenes import admissible
+from gradient_scenes import OF_SMALL_SCENES, admissible
 
 import magshell as ms
 from magshell.solve.linear.stiffness import Stiffness
 
 torch = pytest.importorskip("torch")
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 LARGE = 1e-3  # m, of meshes of 0.1 m
 FACTORS = ("load_factor", "gravity_factor", "field_factor", "support_factor")

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from adjoint_scenes import BENDINGS, DEFAULTS, MESH, N_V, everything, shell
 from gradient_kinds import kind
+from gradient_scenes import OF_SMALL_SCENES
 
 import magshell as ms
 
 torch = pytest.importorskip("torch")
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 EXACT = {"solver": ms.MixedNewton(tolerance=1e-13), "progress": False}
 FACTORS = {"load_factor": 0.9, "gravity_factor": 0.8, "field_factor": 1.1, "support_factor": 0.7}

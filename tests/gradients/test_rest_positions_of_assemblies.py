@@ -7,12 +7,15 @@ import pytest
 from adjoint_scenes import MESH, N_V
 from gradient_kinds import kind
 from gradient_kinds_contact import FLAT
+from gradient_scenes import OF_SMALL_SCENES
 from test_critical_points import FIELD, HALVES, MIDDLE, beam
 from test_rest_positions_of_solids import EXACT, compare, moved, tensor
 
 import magshell as ms
 
 torch = pytest.importorskip("torch")
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 GIVEN = {"applied_flux_density": (1e-3, -2e-3, 3e-3), "field_factor": 0.8}
 X = MESH.rest_positions + 1e-3 * np.random.default_rng(2).standard_normal((N_V, 3))

@@ -6,12 +6,15 @@ from adjoint_scenes import MESH
 from gradient_kinds import kind
 from gradient_kinds_bodies import CORNER
 from gradient_kinds_contact import ABOVE, RUBS
+from gradient_scenes import OF_SMALL_SCENES
 from test_rest_positions_of_assemblies import X, check, sheet, weights_of
 from test_rest_positions_of_solids import EXACT, compare, tensor
 
 import magshell as ms
 
 torch = pytest.importorskip("torch")
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 TIP = MESH.vertices_at(x=0.1)
 

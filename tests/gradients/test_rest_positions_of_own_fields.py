@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from gradient_kinds import kind
 from gradient_kinds_own_field import bodies_with_own_field, stiff_pair, stiff_pair_magnetization
+from gradient_scenes import OF_SMALL_SCENES
 from test_rest_positions_of_assemblies import weights_of
 from test_rest_positions_of_solids import EXACT, compare, tensor
 
@@ -15,6 +16,8 @@ from magshell.model.scene.reshaped import neighbour, reshaped
 from magshell.solve.statics.energies_at import _point
 
 torch = pytest.importorskip("torch")
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 KEYWORDS = {
     name: each.default

@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from gradient_scenes import OF_SMALL_SCENES
 
 import magshell as ms
 
 torch = pytest.importorskip("torch")
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 EXACT = {"solver": ms.MixedNewton(tolerance=1e-13), "progress": False}
 RNG = np.random.default_rng(4)

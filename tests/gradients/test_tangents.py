@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from gradient_kinds import MAKERS, kind
-from gradient_scenes import label
+from gradient_scenes import OF_SMALL_SCENES, label
 
 import magshell as ms
 from magshell.solve.adjoint.differences import directional_derivative
@@ -11,6 +11,8 @@ from magshell.solve.adjoint.differences import directional_derivative
 torch = pytest.importorskip("torch")
 from both_modes import by_both_modes, direction  # noqa: E402
 from torch.autograd import forward_ad  # noqa: E402
+
+pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
 LARGE = 1e-3  # m, of meshes of 0.1 m
 # Contacts of edges with the same area at rest count the smaller one, which has a kink there: the differences that give

@@ -36,8 +36,8 @@ class Sample:
         self.scene = ms.Scene(self.shell, supports=[self.clamp], loads=[self.load], gravity=(0, 0, -0.1))
         field = [ms.UniformField(), self.dipoles, self.grid]
         self.magnetic = ms.Scene(self.shell, supports=[self.clamp], loads=[self.load], field=field)
-        press = ms.EdgeLoad(self.mesh.edges_at(x=self.mesh.rest_positions[:, 0].max()), (-0.01, 0.0, 0.0))
-        self.pressed = ms.Scene(self.shell, supports=[self.clamp], loads=[press], field=field)
+        press = ms.EdgeLoad(self.mesh.edges_at(x=self.mesh.rest_positions[:, 0].max()), (-0.03, 0.0, 0.0))
+        self.pressed = ms.Scene(self.shell, supports=[self.clamp], loads=[press], field=ms.UniformField())
         self.magnetization = np.tile((1e4, 0.0, 2e3), (self.mesh.n_faces, 1))
         self.field = np.array((0.0, 0.0, 1e-3))
         self.rest = ms.equilibrium(self.scene)

@@ -50,6 +50,7 @@ def test_every_public_name_is_called(table):
     assert set(NOT_CALLED) <= public_names(ms)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LinearTheoryWarning")
 @pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_arguments_work_before_they_are_spoilt(table):
     """Check that all calls work; otherwise only their first refusal would be tested."""
@@ -60,6 +61,7 @@ def test_arguments_work_before_they_are_spoilt(table):
         call.function(**call.arguments)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LinearTheoryWarning")
 @pytest.mark.parametrize("part", range(PROCESSES))
 def test_spoilt_arguments_are_refused(part, tmp_path):
     pytest.importorskip("torch")

@@ -10,11 +10,11 @@ import magshell as ms
 torch = pytest.importorskip("torch")
 
 MESH = ms.meshes.rectangle(0.05, 0.01, cells=(6, 2))
-SHEET = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, poisson_ratio=0.3, mass_density=1e3)
+SHEET = ms.Shell(MESH, thickness=1e-3, young_modulus=1e8, poisson_ratio=0.3, mass_density=1e3)
 UNIFORM = ms.UniformField()
 CUBE = ms.CuboidMagnet((0.01, 0.01, 0.01), (0, 0, 2e5), center=(0.05, 0.005, 0.05))
 CLAMP = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 1e-3))
-LOAD = ms.EdgeLoad(MESH.edges_at(x=0.05), (-0.02, 0, 0.05))
+LOAD = ms.EdgeLoad(MESH.edges_at(x=0.05), (-5.0, 0, 0.05))
 SCENE = ms.Scene(SHEET, supports=[CLAMP], loads=[LOAD], field=[UNIFORM, CUBE], gravity=(0, 0, -9.81))
 MAGNETIZATION, FIELD = (2e4, 0.0, 1e3), np.array((1e-3, 0, 2e-3))
 FACTORS = {"load_factor": 0.7, "gravity_factor": 0.6, "field_factor": 0.9, "support_factor": 0.8}

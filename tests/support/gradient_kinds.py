@@ -1,5 +1,6 @@
 """The kinds of scene in which test_every_gradient.py differentiates, a dozen faces each."""
 
+import warnings
 from functools import cache
 
 import numpy as np
@@ -433,4 +434,6 @@ MAKERS = {
 
 @cache
 def kind(name: str) -> Kind:
-    return MAKERS[name]()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of meshes of a dozen elements
+        return MAKERS[name]()

@@ -20,6 +20,19 @@ from magshell.model.solids.materials import SolidMaterial
 
 torch = pytest.importorskip("torch")
 IN_TIME = ", in time"
+# Filters of warnings: the scenes have a dozen elements, and steps that are long for their bodies.
+OF_SMALL_SCENES = [
+    f"ignore::magshell.{kind}Warning"
+    for kind in (
+        "StepError",
+        "LargeStrain",
+        "MeshQuality",
+        "Unit",
+        "FieldSampling",
+        "LinearTheory",
+        "Susceptibility",
+    )
+]
 # Keywords of a solve that are no numbers to differentiate by.
 SETTINGS = {"batch", "threads", "scene", "values", "solver", "progress"}
 SETTINGS_OF = {

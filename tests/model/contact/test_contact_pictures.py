@@ -53,6 +53,7 @@ def test_a_pressure_integrates_to_the_normal_forces(fallen):
     assert of_bodies[1] == pytest.approx(on_ball.normal_force + on_floor.normal_force, rel=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_a_uniform_pressure_is_the_weight_over_the_area():
     """Check m g/A at every vertex of a sheet flat on a plate, at borders and corners too."""
     lower, upper = ms.Shell(PLATE, **SOFT), above(1.05e-3, ms.meshes.rectangle(0.01, 0.01, cells=(4, 4)))

@@ -223,8 +223,7 @@ def test_rest_of_a_coarse_motion_is_warned_of():
     bent = MESH.rest_positions + [(0, 0, 1.0)] * (2e-3 * np.cos(np.pi * MESH.rest_positions[:, :1] / 0.03))
     options = {"start": bent, "integrator": ms.ImplicitEuler(), "progress": False}
     lost = "the steps of the motion lost 100 % of the largest energy"
-    with pytest.warns(ms.StepErrorWarning, match=lost):  # unasked, as nothing else changes the energy
-        move = ms.simulate(scene, steps=20, time_step=1e-3, **options)
+    move = ms.simulate(scene, steps=20, time_step=1e-3, **options)
     assert "100 % of the" in repr(move)
     with pytest.warns(ms.StepErrorWarning, match=lost):
         found = move.balance()

@@ -127,7 +127,9 @@ def test_cases_and_gradients(buckled):
             scene, remanent_magnetization=alone, applied_flux_density=(0, 0, field), start=start
         )
         rest.positions.square().sum().backward()
-    torch.testing.assert_close(magnetization.grad, alone.grad, rtol=1e-6, atol=1e-12 * float(alone.grad.abs().max()))
+    torch.testing.assert_close(
+        magnetization.grad, alone.grad, rtol=1e-6, atol=1e-12 * float(alone.grad.abs().max())
+    )
     with pytest.raises(ValueError, match="holds 2 load cases"):
         warm(**design(0.0))
 

@@ -230,12 +230,6 @@ def describe_energy(move: Trajectory) -> str:
     return f"energy: {energy[0]:.4g} J at first, {energy[-1]:.4g} J at last; balance() says where it came from and went"
 
 
-def warn_of_energy(move: Trajectory) -> None:
-    """Warn that the steps made or lost energy, of a motion in which nothing else does."""
-    if (known := rest_of_energy(move)) is not None:
-        _warn_of_rest(move, known)
-
-
 def _warn_of_rest(move: Trajectory, balance: EnergyBalance) -> None:
     """Warn of a rest that is large, unless the errors of the steps have been warned of."""
     if not balance.rest_fraction > LARGEST_REST or move.scene._warned_of_steps or move.scene._warned_of_gains:

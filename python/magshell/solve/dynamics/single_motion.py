@@ -51,7 +51,6 @@ from ..options import (
     as_adjoint_storage,
 )
 from ..statics.equilibrium import Equilibrium
-from .balance import warn_of_energy
 from .conditions import MotionConditions
 from .differentiable_state import DifferentiableState
 from .motion_inputs import MotionInputs
@@ -218,7 +217,6 @@ def run(
     _warn(result)
     warn_of_steps(result)
     warn_of_gains(result)
-    warn_of_energy(result)
     try:  # a field may be a function of the caller's, in which Ctrl-C can come
         _warn_of_fields(result)
     except KeyboardInterrupt as stopped:

@@ -237,7 +237,8 @@ def strain_of_loads(inputs: Inputs) -> float:
         stretched = model.state(x + _STRETCH * arms, np.zeros(scene._bodies.n_rotations))
         energies = [_elastic_energy(model.term_energies(each, [], nothing)) for each in (stretched, rest)]
     stiffness = 2.0 * (energies[0] - energies[1]) / _STRETCH**2
-    work = float((np.linalg.norm(force, axis=1) * np.linalg.norm(arms, axis=1)).sum())
+    with np.errstate(over="ignore"):  # infinite work is no strain, below
+        work = float((np.linalg.norm(force, axis=1) * np.linalg.norm(arms, axis=1)).sum())
     return work / stiffness if stiffness > 0.0 and np.isfinite(work) else 0.0
 
 
