@@ -1,7 +1,7 @@
 """Prints the test files of rooms of the sources, the most concerned first, as many as fit into a time.
 
     python scripts/tests_of.py room contact                   for `make room`: a room's tests, then those that use it
-    python scripts/tests_of.py change [BASE] [--seconds 1100]  for `make change`: tests of the rooms changed since BASE and
+    python scripts/tests_of.py change [BASE] [--seconds 450]  for `make change`: tests of the rooms changed since BASE and
                                                               of the rooms above them
 
 Rooms, their order and their folders of tests are those of docs/map.md. The time is that of the processor as
@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-ROOM_SECONDS, CHANGE_SECONDS = 100.0, 1100.0  # s of the processor: a minute and ten of two processors
+ROOM_SECONDS, CHANGE_SECONDS = 100.0, 450.0  # s of the processor: a minute and four of two processors
 # Tests of the whole, which stand above all rooms.
 ABOVE = ["gradients", "invariants", "hard", "physics", "examples", "docs", "benchmarks"]
 # A change of these files counts as one of every room, as all depend on them.

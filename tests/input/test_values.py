@@ -45,6 +45,7 @@ def test_keywords_are_short_forms_to_the_last_bit(name):
     assert np.array_equal(mixed, short)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 @pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("name", ("equilibrium", "warm start", "simulate"))
 def test_material_has_short_forms_too(name):

@@ -6,6 +6,7 @@ A new value of an object (`_replaceable`), or a new keyword of a solve, is an in
 from __future__ import annotations
 
 import inspect
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -154,7 +155,9 @@ class Kind:
 
     @cached_property
     def entries(self) -> dict[tuple, np.ndarray]:
-        return {**self.of_solve, **self.of_objects}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the mesh at other rest positions
+            return {**self.of_solve, **self.of_objects}
 
 
 def admissible(key: tuple, direction: np.ndarray) -> np.ndarray:
