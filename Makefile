@@ -43,7 +43,7 @@ nightly: $(VENV)/.with-test  ## all other tests, and a search at random: a quart
 	    MAGSHELL_SEARCH=1 $(PYTEST) -m "nightly or hypothesis" --hypothesis-seed=$$seed
 	PYTHON=$(CURDIR)/$(VENV)/bin/python scripts/cholmod.sh
 
-change: $(VENV)/.with-test  ## the nightly tests of the rooms that changed since BASE, and of those above them: ten minutes
+change: $(VENV)/.with-test  ## the nightly tests of the rooms that changed since BASE, and of those above them: four minutes
 	files=$$($(VENV)/bin/python scripts/tests_of.py change $(BASE)) && { [ -z "$$files" ] || $(PYTEST) -m nightly $$files; }
 
 seconds: $(VENV)/.with-test  ## measure again which tests take long, and so are nightly: every test
