@@ -171,7 +171,7 @@ test_support_is_refused = refused(
         ("empty clamp", lambda: ms.Clamp(np.zeros(0, int)), "Clamp edges are empty"),
         (
             "empty mask",
-            held_by(ms.Pin(np.zeros(N_V, bool))),
+            lambda: ms.Pin(np.zeros(N_V, bool)),
             "Pin vertices are empty: the mask is False everywhere",
         ),
         (

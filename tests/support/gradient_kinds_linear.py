@@ -172,19 +172,6 @@ def buckling_solid() -> Kind:
     return Kind(scene, inputs, solve=buckling_about, fixed=EXACT, step=2e-3, reach=REACH)
 
 
-def buckling_bent_column() -> Kind:
-    inputs = {
-        "load_factor": 0.9,
-        "gravity_factor": 0.3,
-        "remanent_magnetization": (3e3, 1e3, 2e2),
-        "applied_flux_density": (-1e-3, 3e-4, 0),
-    }
-    scene = column((-9.81, 0.3, 0.3))  # to one side, so that differences stay on one branch
-    # Long steps: the change of the stiffness along the way is a difference, with round-off of its own.
-    reach = {**REACH, "rest_positions": 5e-3}
-    return Kind(scene, inputs, solve=buckling_about, fixed=EXACT, step=2e-3, reach=reach)
-
-
 def snap(scene, values, start=None, solver=None, **given):
     """Return the first limit point of the path on which a field pushes a buckled beam through, as the field grows."""
     values, given = as_values(scene, values, given)
@@ -296,7 +283,6 @@ LINEAR_MAKERS = {
     "a sheet that vibrates about its rest shape": vibrating_at_rest,
     "a beam that snaps at a limit point": snapping_beam,
     "a column that buckles by linear theory": buckling_column,
-    "a bent column that buckles by linear theory": buckling_bent_column,
     "a six-node column that buckles by linear theory": buckling_six_node_column,
     "a solid column that buckles about its equilibrium": buckling_solid,
     "a sheet that responds by linear theory": lambda: responding_sheet(False),
