@@ -17,8 +17,9 @@ FRAMES = {
     "renumbered": Frame(numbers_from=1),
 }
 TOLERANCE = 1e-9  # of the extent
-# The table of what is not held, with its bound. Added mass does not converge with the step and makes round-off grow. The friction of two
-# edges takes the spin of one of the two triangles beside the second one: the first in the order of the numbers.
+# The table of what is not held, with its bound. Added mass does not converge with the step and makes round-off grow. The
+# friction of two edges takes the spin of one of the two triangles beside the second one: the first in the order of the
+# numbers.
 NOT_HELD = {("with_added_mass", frame): 1e-8 for frame in FRAMES}
 NOT_HELD |= {("rubbing", "renumbered"): 1e-3, ("six_nodes + rubbing", "renumbered"): 1e-3}
 
