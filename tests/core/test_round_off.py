@@ -40,7 +40,6 @@ def test_fine_roof_takes_small_steps() -> None:
     assert path.n_negative_eigenvalues[-1] == 0 and len(path) > 2
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("links", [50, 200])
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=repr)
 def test_long_chains_of_links_move_at_the_usual_tolerance(links: int, integrator) -> None:

@@ -18,8 +18,6 @@ from robots import environments  # noqa: E402
 
 from magshell.envs import robots  # noqa: E402
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 
 def pendulum(torque=0.0):
     bob = ms.Link(mass=1.0, center=(0, 0, -1.0), inertia=0.1)

@@ -50,7 +50,6 @@ def test_observations_beyond_their_bounds_raise_by_default():
         one.step([1.0])
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_single_precision_spaces_change_only_the_type():
     double, single = bar(), bar(dtype="float32", observation_bounds=(-10.0, 10.0))
     check_env(single, skip_render_check=True)

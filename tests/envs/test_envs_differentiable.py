@@ -167,7 +167,6 @@ def test_a_detached_state_ends_gradients():
     assert first.grad is None and second.grad.abs().max() > 0
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize(
     "field",
     [

@@ -28,7 +28,6 @@ def pendulum(action_function):
     return one, scene, hinge
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_value_that_a_function_of_the_action_sets():
     """Compare a rate instead of a value, and a function of the time, with one motion under the same time series."""
     one, scene, hinge = pendulum((2, lambda two, time, before: before + two[0] + time * two[1]))
@@ -66,7 +65,6 @@ def swinging(actuators):
     return one, np.array([one.step(each)[0] for each in ((0.5, 1.0), (0.5, -1.0), (-1.0, 1.0))])
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_several_owners_at_once_move_as_each_by_itself():
     """Check also that the function is called once an action, with the former values of all owners."""
     seen = []

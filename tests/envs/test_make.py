@@ -24,7 +24,6 @@ def lifted(scene) -> dict:
     }
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_an_environment_of_a_file_steps_as_one_of_its_scene(tmp_path) -> None:
     ms.save_scene(tmp_path / "strip.scene", SCENE)
     found = []

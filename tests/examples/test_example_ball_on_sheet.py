@@ -15,7 +15,6 @@ def result(example) -> dict:
     return example.main(cases=((8, 2),), throws=example.THROWS[:3], steps=60)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_meshes_are_the_papers(example, result) -> None:
     assert result["rows"][0]["sheet_nodes"] == 81 and result["rows"][0]["ball"] == (43, 80)
     sizes = [example.scenery(example.THROWS[0], cells).sheet.mesh for cells in (16, 32)]

@@ -15,7 +15,6 @@ def result(example) -> dict:
     return example.main(cells=6)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_small_swings_are_those_of_the_first_mode(result) -> None:
     assert result["modes"][0] == pytest.approx(1.0966, rel=1e-3)
     assert result["swung"] == pytest.approx(result["modes"][0], rel=2e-3)

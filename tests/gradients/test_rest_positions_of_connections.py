@@ -379,7 +379,6 @@ def test_gradient_by_rest_positions_of_the_forces_of_a_foundation_agrees_with_di
     compare(loss, X, step=3e-6)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("moving", [False, True], ids=["at rest", "in motion"])
 def test_ball_on_a_rigid_part_at_other_rest_positions_touches_as_in_a_scene_made_so(moving):
     """Check that the ball stays where it was given at rest, and touches."""

@@ -8,8 +8,6 @@ from contact_scenes import Watch
 
 import magshell as ms
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 DENSITY, GRAVITY = 1e3, 9.81
 DOWN = (0.0, 0.0, -GRAVITY)
 

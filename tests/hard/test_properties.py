@@ -167,7 +167,6 @@ def test_the_order_of_a_scenes_parts_does_not_matter(seed, order):
 # Motions
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @some
 @given(seed=SEEDS, bending=BENDINGS, speed=st.tuples(*[st.floats(-3, 3)] * 3))
@@ -276,7 +275,6 @@ def test_a_motion_run_backwards_comes_back_as_steps_get_shorter(seed, bending):
     assert fine < 0.02 and fine < 0.5 * coarse + 1e-4
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @some
 @given(

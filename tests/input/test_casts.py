@@ -61,7 +61,6 @@ def is_numeric(value) -> bool:
     return array.dtype.kind in "iuf" and array.size > 0
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_all_of_them(tmp_path):
     found, missed = 0, []
     for call in calls(Sample(tmp_path)):

@@ -226,7 +226,6 @@ def test_an_equilibrium_tells_and_prints():
     assert f"PASSES THROUGH ITSELF ({len(found)} pairs of faces)" in repr(rest)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_motion_tells_and_prints():
     mesh = ms.meshes.rectangle(0.1, 0.01, cells=(24, 2))
     shell = ms.Shell(mesh, thickness=5e-4, young_modulus=1e6, mass_density=1e3)

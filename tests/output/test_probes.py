@@ -73,7 +73,6 @@ def test_velocities_and_angles_of_a_swing(results):
     assert np.cos(table["bend [rad]"].iloc[-1]) == pytest.approx(cosine, rel=1e-12)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_contact_force_on_a_floor_is_the_weight():
     floor = ms.Contact(ms.obstacles.Plane())
     sheet = ms.Shell(

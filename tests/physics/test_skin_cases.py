@@ -146,7 +146,6 @@ def test_water_on_a_solid_is_that_on_a_shell_around_it():
     np.testing.assert_allclose(forces[0], forces[1], rtol=1e-3)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 def test_a_solid_on_a_floor_is_carried_by_it(element):
     """Check that the contact springs of the vertices on its underside carry its weight; inner vertices have no

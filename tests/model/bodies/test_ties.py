@@ -62,7 +62,6 @@ def test_a_seam_is_a_hinge():
     assert np.allclose(end - seam, (0, 0, -LENGTH / 2), atol=1e-3 * LENGTH)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("moves", [False, True], ids=["at rest", "in motion"])
 def test_a_coating_adds_its_stiffness_and_mass(moves):
     a, b, tie = coated()

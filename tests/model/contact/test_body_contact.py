@@ -101,7 +101,6 @@ def test_upper_sheet_rests_on_the_lower_with_its_full_weight():
     assert rest.contact_state(touch).forces[PLATE.n_vertices :].sum(0)[2] == pytest.approx(weight, rel=1e-8)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()])
 def test_ball_falls_onto_a_sheet_and_never_through(integrator):
     mesh = ms.meshes.rectangle(0.1, 0.1, cells=(6, 6))

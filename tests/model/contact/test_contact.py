@@ -16,8 +16,6 @@ from blocks import (
 
 import magshell as ms
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 
 def normal_forces(contact: ms.Contact, obstacle, positions, sheet) -> np.ndarray:
     """Compute the forces on the vertices by the documented law alone, (n_v, 3) in N."""

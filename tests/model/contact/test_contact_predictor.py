@@ -22,7 +22,6 @@ def thrown_down(scene: ms.Scene, speed: float, steps: int) -> ms.Trajectory:
     )
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("friction", [None, 0.6])
 def test_an_impact_takes_few_factorizations(friction):
     """Check that an impact takes at most 12 factorizations.

@@ -160,7 +160,6 @@ def test_forces_of_obstacles_balance_weight_and_inertia():
     assert not touched.friction_force.any() and not touched.friction_ratios.any()
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_obstacles_are_asked_with_points_on_faces():
     scene = block_on(ms.obstacles.Sphere(0.05, center=(0.01, 0.01, -0.0501)), face_samples=3)
     motion = simulated(scene, 10, 1e-3)
@@ -222,7 +221,6 @@ def test_ridge_of_the_other_surface_makes_a_nonsmooth_vertex(angle, aside, sharp
         np.testing.assert_array_equal(motion.nonsmooth_vertices[0], [lower.mesh.n_vertices])
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_opening_and_closing_of_a_contact_is_smooth():
     """Drop the middle of a sheet on a plate: it touches and leaves again."""
     mesh = ms.meshes.rectangle(0.06, 0.06, cells=(3, 3)).transformed(translation=(-0.02, -0.02, 0))

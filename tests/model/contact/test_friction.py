@@ -7,8 +7,6 @@ from blocks import GRAVITY, STICKING, block_on, block_sheet, resting_on_plane, s
 import magshell as ms
 from magshell.model.supports.supports import rotation_matrix
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 # F1 of the validation's reference.json; ipc-sim/IPC and rigid-ipc, "slopeTest_highSchoolPhysics".
 TANGENT = 0.5  # of the slope
 ANGLE = np.arctan(TANGENT)

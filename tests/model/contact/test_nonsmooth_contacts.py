@@ -21,7 +21,6 @@ def pressed_on(obstacle, steps=3, **options):
     return simulated(block_on(obstacle, sheet=SHEET, **options), steps, 1e-3, velocities=(0, 0, -1e-3))
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_sharp_edge_makes_a_nonsmooth_vertex():
     motion = pressed_on(ridge())
     assert list(motion.nonsmooth_vertices) == [
@@ -32,7 +31,6 @@ def test_sharp_edge_makes_a_nonsmooth_vertex():
         np.testing.assert_array_equal(vertices, MIDDLE)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize(
     "obstacle",
     [
@@ -50,7 +48,6 @@ def test_smooth_bodies_and_the_sides_of_sharp_ones_have_none(obstacle):
     assert motion.nonsmooth_vertices == {}
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_points_on_faces_count_by_their_vertices():
     face = 0
     under = SHEET.mesh.rest_positions[SHEET.mesh.faces[face]].mean(axis=0)

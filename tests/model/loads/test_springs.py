@@ -158,7 +158,6 @@ def test_stiffness_at_an_equilibrium_is_found_by_vibration():
     assert np.sum(np.abs(modes.frequencies - wanted) < 1e-5 * wanted) == 2  # the third is not among five
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_projective_dynamics_includes_springs():
     solid_mesh = ms.meshes.box((0.04, 0.01, 0.01), cells=(4, 1, 1))
     material = ms.Corotated(young_modulus=1e5, poisson_ratio=0.3)

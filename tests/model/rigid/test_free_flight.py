@@ -9,8 +9,6 @@ import magshell as ms
 
 torch = pytest.importorskip("torch")
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 INERTIA = np.array([1.0, 2.0, 3.0])
 METHODS = [ms.TRBDF2(), ms.ImplicitEuler(), ms.SDIRK2(), ms.SDIRK3()]
 ORDERS = [2.0, 1.0, 2.0, 2.0]  # of a top under a torque

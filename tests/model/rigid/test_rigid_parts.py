@@ -10,8 +10,6 @@ import magshell as ms
 
 torch = pytest.importorskip("torch")
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 INERTIA = np.array([1.0, 2.0, 3.0])
 SPIN = np.array([0.1, 2.0, 0.2])
 # Validation case K2a (bodies.json): orientations as quaternions w, x, y, z from an integration to 1e-13.

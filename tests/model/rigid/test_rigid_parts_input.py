@@ -144,7 +144,6 @@ def test_same_bits_on_any_number_of_threads():
         assert np.array_equal(each[0], found[0][0]) and np.array_equal(each[1], found[0][1])
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_pictures_and_printing(tmp_path):
     part, free = payload(), ms.RigidBody(mass=1e-3, inertia=1e-8, angular_velocity=(1.0, 0, 0))
     scene = scene_with(part, free, allow_rigid_motions=True)
@@ -214,7 +213,6 @@ def test_a_warm_start_follows_a_payload():
         assert warm.positions == pytest.approx(cold.positions, abs=1e-9)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_continued_motion_refuses_another_velocity_of_a_free_body():
     free = ms.RigidBody(mass=1.0, inertia=1.0, velocity=(0, 0, 1.0))
     scene = ms.Scene(free, allow_rigid_motions=True)
@@ -223,7 +221,6 @@ def test_continued_motion_refuses_another_velocity_of_a_free_body():
         ms.simulate(scene, steps=1, time_step=0.1, start=first, values={free: {"velocity": (0, 0, 2.0)}})
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_free_bodies_keep_their_velocity_whatever_the_vertices_are_given():
     free, part = ms.RigidBody(mass=1.0, inertia=1.0, velocity=(0, 0, 1.0)), ms.RigidBody(END)
     scene = ms.Scene([strip(), free, part], allow_rigid_motions=True)

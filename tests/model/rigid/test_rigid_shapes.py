@@ -54,7 +54,6 @@ def test_a_cube_falls_slides_and_stops(integrator):
     assert min(motion.contact_state(touch, k).smallest_distance for k in range(41)) > 5e-4
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_shapes_of_rigid_bodies_collide():
     """Check two cubes in free flight: momentum is conserved, and they separate again."""
     a = ms.RigidBody.of(cube(0.0), 1e3, velocity=(0.1, 0, 0))
@@ -148,7 +147,6 @@ def test_gradients_go_through():
         assert float((leaf.grad * torch.as_tensor(step)).sum()) == pytest.approx(float(differences), rel=1e-4)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_link_touches_with_its_shape():
     """Check that a pendulum that swings onto a held plate stays on its side."""
     plate = ms.Shell(PLATE, **SOFT)
@@ -166,7 +164,7 @@ def test_a_link_touches_with_its_shape():
     assert motion[arm].center[-1][2] < arm.center[2] - 3e-4
 
 
-@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning", "ignore::magshell.StepErrorWarning")
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_pictures_show_rigid_shapes(tmp_path):
     part = ms.RigidBody.of(cube(), 2e3)
     scene = on_plate(part)

@@ -166,7 +166,6 @@ def test_changed_pitch_equals_a_scene_made_with_it():
     assert float(replaced[screw].angle) == pytest.approx((0.3 - 2.0 * G * 0.1) / 0.5, rel=1e-9)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_motion_goes_on_only_with_the_pitch_of_its_start():
     scene, screw, _ = nut(rate=40.0)
     first = ms.simulate(scene, steps=20, time_step=1e-2)

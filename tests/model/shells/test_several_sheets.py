@@ -215,7 +215,6 @@ def compressed_strips(*which):
     )
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_pictures_films_pages_and_files_contain_all_sheets(pair, tmp_path):
     _, scene, _ = pair
     rest = ms.equilibrium(scene, applied_flux_density=STRONG)
@@ -234,7 +233,6 @@ def test_pictures_films_pages_and_files_contain_all_sheets(pair, tmp_path):
     assert mesh.n_components == 2 and mesh.n_faces == scene.mesh.n_faces
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_contacts_and_symmetry_planes_hold_all_bodies_or_one():
     sheets = [strip(k, remanent_magnetization=None) for k in (0, 1)]
     floor = ob.Plane(center=(0, 0, -1e-3))
@@ -303,7 +301,6 @@ def test_free_motions_of_each_body_are_named():
         ms.Scene(sheets, supports=[ms.Clamp(sheets[0].mesh.edges_at(x=0.0), body=sheets[0])])
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_strains_are_those_of_each_sheet(pair):
     _, scene, alone = pair
     both = ms.equilibrium(scene, applied_flux_density=STRONG, **EXACT)

@@ -69,7 +69,6 @@ def test_stress_is_that_of_the_values_the_result_was_found_with():
     assert np.array_equal(soft[solid].strains().von_mises_stresses, before)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_every_kind_of_result_has_strains_of_its_solid():
     solid = bar(mass_density=1e3)
     scene = pulled(solid, gravity=(0, 0, 1e-6))

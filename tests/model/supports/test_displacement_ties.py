@@ -144,7 +144,6 @@ def test_a_slanted_direction_is_the_turned_picture_of_an_axis() -> None:
     np.testing.assert_allclose(found[1], found[0], atol=1e-9 * np.abs(found[0]).max())
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), ms.TRBDF2()], ids=["euler", "tr_bdf2"])
 def test_a_thrown_periodic_cell_flies_straight(integrator) -> None:
     mesh = ms.meshes.rectangle(0.02, 0.01, cells=(4, 2))

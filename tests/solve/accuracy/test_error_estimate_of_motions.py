@@ -205,7 +205,6 @@ def test_lumped_masses_have_the_order_two():
     assert 3.0 < changes[0] / changes[1] < 5.0
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_motions_without_an_estimate_are_refused_by_name():
     scene, vertices = strip(1)
     output = height_of(vertices)

@@ -22,7 +22,6 @@ def exact():
     return swinging_strip(400, 5e-4, ms.SDIRK3())
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=names)
 def test_error_at_the_end_falls_with_the_tolerance(integrator, exact) -> None:
     moves = [swinging_strip(5, ms.Adaptive(0.04, tolerance), integrator) for tolerance in (1e-4, 1e-5, 1e-6)]
@@ -46,14 +45,12 @@ def test_steps_are_binary_fractions_aligned_to_the_grid() -> None:
     assert f"5 steps in {len(move.time_steps)}" in repr(move)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_ladder_keeps_its_steps_where_a_mass_bounces() -> None:
     moves = bounces(0.13, 1e-5, 1e-6, count=12)
     assert changes(moves) == 0 and len(moves[0].time_steps) > 20
     assert noise(moves) < 1e-6 * 1e-5
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_short_steps_resolve_an_impact_and_long_ones_follow() -> None:
     move = bounce(bouncing_plate(), 0.1, ms.Adaptive(BOUNCE / 8, 1e-4))
     assert move.time_steps.max() >= 16 * move.time_steps.min()

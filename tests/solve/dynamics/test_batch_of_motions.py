@@ -31,7 +31,6 @@ def assert_same(batch, k, alone):
     np.testing.assert_array_equal(batch[k].end.state, alone.end.state)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", [ms.TRBDF2(), ms.ImplicitEuler()], ids=["TRBDF2", "Euler"])
 def test_members_have_the_bits_of_single_motions(integrator):
     """Give an axis to constants, to series in time, to a support's path, and to the start."""

@@ -57,7 +57,6 @@ def test_terminal_speed_of_a_damped_fall():
     np.testing.assert_allclose(move.velocities[-1, :, 2], -9.81 * 0.005, rtol=1e-8)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_momenta_of_a_free_sheet(integrator):
     """Check a spinning and stretched sheet: momentum is exact, angular momentum to the order of the method."""
@@ -101,7 +100,6 @@ def test_viscous_sheets_lose_energy_and_rest_where_elastic_ones_do(strip, law):
     assert viscous.energy[20] < elastic.energy[20]
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_viscosity_does_not_slow_a_rigid_motion():
     scene = ms.Scene(shell(), allow_rigid_motions=True)
     turning = np.cross((0.0, 0.0, 10.0), MESH.rest_positions)

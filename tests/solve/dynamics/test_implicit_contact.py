@@ -13,7 +13,6 @@ IMPLICIT = ms.TRBDF2(implicit_contact=True)
 DEFAULT = None  # Impacts are measured with the integrator of users who name none.
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("stiffness", [50.0, 2500.0], ids=["soft wall", "stiff wall"])
 @pytest.mark.parametrize("steps, restitution", [(20, 0.93), (100, 0.97)])
 def test_a_bar_rebounds_from_a_wall(steps, restitution, stiffness):
@@ -60,7 +59,6 @@ def test_an_unresolved_impact_loses_energy(ratio):
     assert np.mean(back) <= 0.2
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_no_integrator_gains_energy_at_an_obstacle():
     """Check that TR-BDF2 without implicit contact falls back where an unresolved impact would gain energy."""
     moves = [cube_on_a_plane(ms.TRBDF2(), 20.0, phase) for phase in np.linspace(0.0, 1.0, 10)]
@@ -193,7 +191,6 @@ def arm_on_a_plane():
     return ms.Scene([sheet, skeleton], contacts=[ground], gravity=(0, 0, -9.81)), shoulder, ground
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_motor_feels_the_contact_force_once():
     """Compare with the equilibrium from which the motion starts, in the first step too."""
     scene, shoulder, ground = arm_on_a_plane()

@@ -129,13 +129,11 @@ def remaining_energy(scene, integrator, amplitude, steps=40, periods=20):
     return move.energy[-1] / move.energy[0]
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("amplitude", [1e-3, 0.1, 0.3])
 def test_energy_over_20_periods(amplitude):
     assert remaining_energy(strip(1e-3, (10, 2)), ms.TRBDF2(), amplitude) > 0.98
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_sdirk2_keeps_it_in_small_motions_only():
     sheet = strip(1e-3, (10, 2))
     assert remaining_energy(sheet, ms.SDIRK2(), 0.05) > 0.98
@@ -159,7 +157,6 @@ def amplification(name, theta):
     return np.polynomial.Polynomial(above)(1j * theta) / below(1j * theta)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("name", INTEGRATORS)
 @pytest.mark.parametrize("steps", [20, 40])
 def test_a_small_vibration_is_the_linear_test_equation(name, steps):

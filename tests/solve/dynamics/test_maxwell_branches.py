@@ -171,7 +171,6 @@ def test_branches_of_one_time_are_one_and_their_order_is_free(integrator):
         np.testing.assert_allclose(same.positions, one.positions, rtol=0, atol=1e-9 * LENGTH)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize(
     ("name", "size", "more"),
     [("maxwell_modulus", 1e-2, {"maxwell_time": 1e-2}), ("stiffness_damping", 1e-4, {})],

@@ -51,7 +51,6 @@ def touched(move) -> bool:
     return np.max(move.energies["body contact"]) > 0.0
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("law", ["barrier", "penalty"])
 @pytest.mark.parametrize("rubbing", [None, 0.4])
 def test_a_block_on_another_is_as_newton_has_it(law, rubbing):
@@ -93,7 +92,6 @@ def test_a_sheet_that_touches_itself():
     assert np.abs(found.positions - exact.positions).max() < 1e-8 * 0.06
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_on_a_skeleton():
     """Drop a block on a bar with two bones in it, of which one rotates; this includes the Schur complement."""
     bar = ms.meshes.box((0.06, 0.01, 0.01), cells=(6, 1, 1))

@@ -202,7 +202,6 @@ def nearest(scene, move) -> float:
     return max(scene._model.energies(q, load_parameters)["body contact"] for q in states)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("friction", [None, 0.3])
 def test_bodies_exchange_momentum_and_gain_no_energy(friction):
     scene, lower, upper, start = thrown_at_each_other(friction, (0.1, 0.0, -0.5))

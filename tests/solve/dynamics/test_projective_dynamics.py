@@ -11,8 +11,6 @@ from projective_bars import MATERIALS, NEWTON, SIZE, TIGHT, assert_same, bar, bo
 
 import magshell as ms
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 
 @pytest.mark.parametrize("element", ["linear", "quadratic"])
 @pytest.mark.parametrize("name", MATERIALS)

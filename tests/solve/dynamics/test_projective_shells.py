@@ -8,8 +8,6 @@ import torch
 
 import magshell as ms
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 BENDINGS = ("hinge", "midedge", "midedge2")
 
 

@@ -8,8 +8,6 @@ from chosen_steps import bouncing_plate, distance, swinging_strip
 
 import magshell as ms
 
-pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
-
 INTEGRATORS = [ms.ImplicitEuler(), ms.TRBDF2(), ms.SDIRK2(), ms.SDIRK3()]
 ORDERS = {"ImplicitEuler": 1, "TRBDF2": 2, "SDIRK2": 2, "SDIRK3": 3}
 
@@ -187,7 +185,7 @@ def test_minimize_warns_once_that_objectives_may_jump() -> None:
     assert len(jumps) == 1 and jumps[0].category is ms.StepErrorWarning
 
 
-@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning", "ignore::magshell.StepErrorWarning")
 def test_divided_steps_are_told_during_the_motion(monkeypatch):
     """Let a field jump in every step, with too few iterations for it, so that each step is taken in parts."""
     from magshell._runtime.progress import SolveBar

@@ -156,7 +156,6 @@ def test_an_unstable_equilibrium_says_so(magnetic):
     assert "unstable: 1 mode(s) grow" in repr(found)
 
 
-@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_the_growth_rate_is_that_of_the_motion(magnetic):
     straight = ms.equilibrium(magnetic, **along_the_axis(-3.0), require_stable=False)
     modes = ms.vibration_modes(magnetic, straight, count=1)
