@@ -24,6 +24,7 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
+import torch  # noqa: E402
 from hypothesis import HealthCheck, settings  # noqa: E402
 from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
     pytest_collection_modifyitems,
@@ -34,6 +35,9 @@ from parallel import (  # noqa: E402, F401 - pytest finds hooks by their names
 )
 
 from magshell._runtime.broken_pipes import ignore_broken_pipes  # noqa: E402
+
+# torch gives some warnings once a process, and so to whichever test comes first.
+torch.set_warn_always(True)
 
 # Neither looks at a clock, nor remembers what failed before.
 UNTIMED = {"deadline": None, "database": None, "suppress_health_check": [HealthCheck.too_slow]}
