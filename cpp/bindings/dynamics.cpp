@@ -115,6 +115,7 @@ MotionInput input_of(Model& model, const py::dict& given) {
         if (MaxwellStrains rates = strains_of(model, array("strain_rates"), 1); !rates.empty())
             input.start.rates.elastic.d = std::move(rates.front());
         input.start.rates.elastic.e = strains_of(model, array("maxwell_strain_rates"), branches);
+        if (model.may_carry_momentum()) input.start.rates.momentum_rate = to_vector(array("momentum_rate"));
     }
     input.rotations_given = given["rotations_given"].cast<bool>();
     input.tableau = tableau_of(given["integrator"].cast<std::string>());
@@ -465,6 +466,8 @@ void register_dynamics(py::module_& module) {
                                [](const MotionResult& r) { return r.last.rates.acceleration; })
         .def_property_readonly("last_contact_acceleration",
                                [](const MotionResult& r) { return r.last.rates.c; })
+        .def_property_readonly("last_momentum_rate",
+                               [](const MotionResult& r) { return r.last.rates.momentum_rate; })
         .def("last_maxwell_strains",
              [](const MotionResult& r, const Model& m) { return numbers_of(m, r.last.e); })
         .def("last_strain_rates",

@@ -8,6 +8,7 @@
 
 #include "bindings/bindings.h"
 #include "magshell/core/errors.h"
+#include "magshell/force/added_mass.h"
 #include "magshell/force/drag.h"
 
 namespace magshell::bindings {
@@ -40,7 +41,7 @@ class FaceCorners {
         }
     }
     py::ssize_t count() const { return array_.shape(0); }
-    Drag::Corners operator[](py::ssize_t face) const {
+    MovingFace::Corners operator[](py::ssize_t face) const {
         const double* p = array_.data(face, 0, 0);
         return {Vec3(p), Vec3(p + 3), Vec3(p + 6)};
     }
@@ -50,66 +51,95 @@ class FaceCorners {
 };
 
 struct MovingFaces {
-    FaceCorners positions, velocities, accelerations;
+    FaceCorners positions, velocities;
 
-    MovingFaces(const Array& x, const Array& v, const Array& w)
-        : positions(x, "positions"), velocities(v, "velocities"), accelerations(w, "accelerations") {
-        if (velocities.count() != count() || accelerations.count() != count()) {
-            throw InvalidInput("there must be as many velocities and accelerations as positions");
-        }
+    MovingFaces(const Array& x, const Array& v) : positions(x, "positions"), velocities(v, "velocities") {
+        if (velocities.count() != count())
+            throw InvalidInput("there must be as many velocities as positions");
     }
     py::ssize_t count() const { return positions.count(); }
-    Drag drag(const Water& water, py::ssize_t face) const {
-        return Drag(water, positions[face], velocities[face], accelerations[face]);
+    MovingFace at(const Water& water, py::ssize_t face) const {
+        return {water.velocity, positions[face], velocities[face]};
     }
 };
 
-py::dict drag_faces(const Water& water, const Array& positions, const Array& velocities,
-                    const Array& accelerations) {
-    const MovingFaces faces(positions, velocities, accelerations);
+void store(const Mat3& from, double* to) {
+    Eigen::Map<RowMajor3>{to} = from;
+}
+
+py::dict drag_faces(const Water& water, const Array& positions, const Array& velocities) {
+    const MovingFaces faces(positions, velocities);
     const py::ssize_t n = faces.count(), three = 3;
-    Array force({n, three}), by_position({n, three, three, three}), by_velocity({n, three, three}),
-        by_acceleration({n, three, three});
+    Array force({n, three}), by_position({n, three, three, three}), by_velocity({n, three, three});
     for (py::ssize_t f = 0; f < n; ++f) {
-        const Drag drag = faces.drag(water, f);
+        const MovingFace face = faces.at(water, f);
+        const Drag drag(water, face);
         const Drag::Jacobian jacobian = drag.corner_jacobian();
         Eigen::Map<Vec3>(force.mutable_data(f, 0)) = drag.corner_force();
-        for (int k = 0; k < 3; ++k)
-            Eigen::Map<RowMajor3>(by_position.mutable_data(f, k, 0, 0)) = jacobian.by_position[k];
-        Eigen::Map<RowMajor3>(by_velocity.mutable_data(f, 0, 0)) = jacobian.by_velocity;
-        Eigen::Map<RowMajor3>(by_acceleration.mutable_data(f, 0, 0)) = jacobian.by_acceleration;
+        for (int k = 0; k < 3; ++k) store(jacobian.by_position[k], by_position.mutable_data(f, k, 0, 0));
+        store(jacobian.by_velocity, by_velocity.mutable_data(f, 0, 0));
     }
     py::dict result;
     result["corner_force"] = force;
     result["by_position"] = by_position;
     result["by_velocity"] = by_velocity;
-    result["by_acceleration"] = by_acceleration;
     return result;
 }
 
 py::dict drag_gradients(const Water& water, const Array& positions, const Array& velocities,
-                        const Array& accelerations, const Array& multipliers) {
-    const MovingFaces faces(positions, velocities, accelerations);
+                        const Array& multipliers) {
+    const MovingFaces faces(positions, velocities);
     const py::ssize_t n = faces.count();
     if (multipliers.ndim() != 2 || multipliers.shape(0) != n || multipliers.shape(1) != 3) {
         throw InvalidInput("multipliers must have shape (n, 3)");
     }
-    Array density(n), velocity({n, py::ssize_t{3}}), drag_coefficient(n), thrust_coefficient(n),
-        added_mass(n);
+    Array density(n), velocity({n, py::ssize_t{3}}), drag_coefficient(n), thrust_coefficient(n), normal(n),
+        tangential(n);
     for (py::ssize_t f = 0; f < n; ++f) {
-        const Drag::Gradient gradient = faces.drag(water, f).gradient(Vec3(multipliers.data(f, 0)));
+        const MovingFace face = faces.at(water, f);
+        const Drag::Gradient gradient = Drag(water, face).gradient(Vec3(multipliers.data(f, 0)));
         density.mutable_at(f) = gradient.fluid_density;
         Eigen::Map<Vec3>(velocity.mutable_data(f, 0)) = gradient.velocity;
         drag_coefficient.mutable_at(f) = gradient.drag_coefficient;
         thrust_coefficient.mutable_at(f) = gradient.thrust_coefficient;
-        added_mass.mutable_at(f) = gradient.added_mass;
+        normal.mutable_at(f) = gradient.normal_viscous_drag;
+        tangential.mutable_at(f) = gradient.tangential_viscous_drag;
     }
     py::dict result;
     result["fluid_density"] = density;
     result["velocity"] = velocity;
     result["drag_coefficient"] = drag_coefficient;
     result["thrust_coefficient"] = thrust_coefficient;
-    result["added_mass"] = added_mass;
+    result["normal_viscous_drag"] = normal;
+    result["tangential_viscous_drag"] = tangential;
+    return result;
+}
+
+py::dict added_mass_faces(const Water& water, const Array& positions, const Array& velocities) {
+    const MovingFaces faces(positions, velocities);
+    const py::ssize_t n = faces.count(), three = 3, nine = 9;
+    Array energy(n), momentum({n, three}), momentum_by_position({n, three, three, three}),
+        momentum_by_velocity({n, three, three}), force({n, three, three}), hessian({n, nine, nine});
+    for (py::ssize_t f = 0; f < n; ++f) {
+        const MovingFace face = faces.at(water, f);
+        const AddedMass added(water.added_mass, face);
+        energy.mutable_at(f) = added.energy(water.velocity);
+        Eigen::Map<Vec3>(momentum.mutable_data(f, 0)) = added.corner_momentum();
+        store(added.momentum_by_velocity(), momentum_by_velocity.mutable_data(f, 0, 0));
+        const MovingFace::Corners by_position = added.by_position();
+        for (int k = 0; k < 3; ++k) {
+            store(added.momentum_by_position(k), momentum_by_position.mutable_data(f, k, 0, 0));
+            Eigen::Map<Vec3>(force.mutable_data(f, k, 0)) = by_position[k];
+        }
+        Eigen::Map<AddedMass::Mat9>(hessian.mutable_data(f, 0, 0)) = added.hessian();
+    }
+    py::dict result;
+    result["energy"] = energy;
+    result["corner_momentum"] = momentum;
+    result["momentum_by_position"] = momentum_by_position;
+    result["momentum_by_velocity"] = momentum_by_velocity;
+    result["by_position"] = force;
+    result["hessian"] = hessian;
     return result;
 }
 
@@ -125,27 +155,36 @@ void register_water(py::module_& module) {
 
     py::class_<Water, std::shared_ptr<Water>>(module, "Water")
         .def(py::init([](double fluid_density, const std::array<double, 3>& velocity, double drag_coefficient,
-                         double thrust_coefficient, double added_mass, const AttackCurve& drag_curve,
+                         double thrust_coefficient, double added_mass, double normal_viscous_drag,
+                         double tangential_viscous_drag, const AttackCurve& drag_curve,
                          const AttackCurve& thrust_curve) {
                  return std::make_shared<Water>(Water{fluid_density, Vec3(velocity.data()), drag_coefficient,
-                                                      thrust_coefficient, added_mass, drag_curve,
-                                                      thrust_curve});
+                                                      thrust_coefficient, added_mass, normal_viscous_drag,
+                                                      tangential_viscous_drag, drag_curve, thrust_curve});
              }),
              py::kw_only(), py::arg("fluid_density"), py::arg("velocity"), py::arg("drag_coefficient"),
-             py::arg("thrust_coefficient"), py::arg("added_mass"), py::arg("drag_curve"),
-             py::arg("thrust_curve"));
+             py::arg("thrust_coefficient"), py::arg("added_mass"), py::arg("normal_viscous_drag"),
+             py::arg("tangential_viscous_drag"), py::arg("drag_curve"), py::arg("thrust_curve"));
 
-    module.def(
-        "drag_faces", &drag_faces, py::arg("water"), py::arg("positions"), py::arg("velocities"),
-        py::arg("accelerations"),
-        "The force of water on each corner of every face (n, 3) [N], and its derivatives by the position of "
-        "each corner (n, 3, 3, 3) as [face, corner, force, position], by the mean velocity and by the mean "
-        "acceleration of the corners (n, 3, 3). All arguments are (n, 3, 3), a row a corner.");
+    module.def("drag_faces", &drag_faces, py::arg("water"), py::arg("positions"), py::arg("velocities"),
+               "The force of water on each corner of every face without added mass (n, 3) [N], and its "
+               "derivatives by "
+               "the position of each corner (n, 3, 3, 3) as [face, corner, force, position] and by the mean "
+               "velocity of "
+               "the corners (n, 3, 3). All arguments are (n, 3, 3), a row a corner.");
     module.def("drag_gradients", &drag_gradients, py::arg("water"), py::arg("positions"),
-               py::arg("velocities"), py::arg("accelerations"), py::arg("multipliers"),
+               py::arg("velocities"), py::arg("multipliers"),
                "For each face the gradient of multiplier . f by what describes the water; f is the force on "
-               "the face, "
-               "multipliers are (n, 3).");
+               "the face without added mass, multipliers are (n, 3).");
+    module.def("added_mass_faces", &added_mass_faces, py::arg("water"), py::arg("positions"),
+               py::arg("velocities"),
+               "The energy v . dT/dv - T (n,) [J] of the water that faces push, the momentum that each "
+               "corner carries "
+               "(n, 3) [N s], its derivatives by the position of each corner (n, 3, 3, 3) as [face, corner, "
+               "momentum, "
+               "position] and by the mean velocity of the corners (n, 3, 3), and the first and second "
+               "derivatives of T "
+               "by positions, (n, 3, 3) [N] and (n, 9, 9) [N/m].");
 }
 
 }  // namespace magshell::bindings

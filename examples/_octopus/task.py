@@ -73,7 +73,9 @@ class Swim:
         self.scene = ms.Scene(
             self.body.shell,
             field=ms.UniformField(),
-            water=ms.Water(fluid_density=WATER),
+            water=ms.Water(
+                fluid_density=WATER, drag_coefficient=1.0, thrust_coefficient=1.0
+            ),  # [Chen22] (44)
             contacts=contacts,
             allow_rigid_motions=True,
         )

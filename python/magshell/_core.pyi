@@ -49,6 +49,7 @@ __all__: list[str] = [
     "TriangleMesh",
     "WatchedObstacle",
     "Water",
+    "added_mass_faces",
     "analyze",
     "at_nodes",
     "build_info",
@@ -397,6 +398,8 @@ class Water:
         drag_coefficient: typing.SupportsFloat | typing.SupportsIndex,
         thrust_coefficient: typing.SupportsFloat | typing.SupportsIndex,
         added_mass: typing.SupportsFloat | typing.SupportsIndex,
+        normal_viscous_drag: typing.SupportsFloat | typing.SupportsIndex,
+        tangential_viscous_drag: typing.SupportsFloat | typing.SupportsIndex,
         drag_curve: AttackCurve,
         thrust_curve: AttackCurve,
     ) -> None: ...
@@ -1123,6 +1126,8 @@ class MotionResult:
         self,
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
+    def last_momentum_rate(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
+    @property
     def last_state(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]: ...
     @property
     def last_turns(self) -> list[list[float]]: ...
@@ -1189,6 +1194,15 @@ class BroadPhase:
         margins: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex],
     ) -> dict[str, typing.Any]: ...
 
+def added_mass_faces(
+    water: Water,
+    positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+    velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
+) -> dict[str, typing.Any]:
+    """
+    The energy v . dT/dv - T (n,) [J] of the water that faces push, the momentum that each corner carries (n, 3) [N s], its derivatives by the position of each corner (n, 3, 3, 3) as [face, corner, momentum, position] and by the mean velocity of the corners (n, 3, 3), and the first and second derivatives of T by positions, (n, 3, 3) [N] and (n, 9, 9) [N/m].
+    """
+
 def analyze(
     size: typing.SupportsInt | typing.SupportsIndex,
     column_starts: typing.Annotated[numpy.typing.ArrayLike, numpy.int32],
@@ -1236,21 +1250,19 @@ def drag_faces(
     water: Water,
     positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    accelerations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> dict[str, typing.Any]:
     """
-    The force of water on each corner of every face (n, 3) [N], and its derivatives by the position of each corner (n, 3, 3, 3) as [face, corner, force, position], by the mean velocity and by the mean acceleration of the corners (n, 3, 3). All arguments are (n, 3, 3), a row a corner.
+    The force of water on each corner of every face without added mass (n, 3) [N], and its derivatives by the position of each corner (n, 3, 3, 3) as [face, corner, force, position] and by the mean velocity of the corners (n, 3, 3). All arguments are (n, 3, 3), a row a corner.
     """
 
 def drag_gradients(
     water: Water,
     positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     velocities: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
-    accelerations: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
     multipliers: typing.Annotated[numpy.typing.ArrayLike, numpy.float64],
 ) -> dict[str, typing.Any]:
     """
-    For each face the gradient of multiplier . f by what describes the water; f is the force on the face, multipliers are (n, 3).
+    For each face the gradient of multiplier . f by what describes the water; f is the force on the face without added mass, multipliers are (n, 3).
     """
 
 def element_energies(

@@ -1,4 +1,7 @@
-"""Drag and thrust on single faces, [Chen22] (42)-(44): against published numbers, a second formula, and differences."""
+"""Drag, thrust and viscous drag on single faces: against published numbers, a second formula, and differences.
+
+[Chen22] (42)-(44). Added mass: test_added_mass_kernel.
+"""
 
 import numpy as np
 import pytest
@@ -57,22 +60,23 @@ def make(tables=None, **changes):
         "velocity": (0.3, -0.2, 0.4),
         "drag_coefficient": 0.7,
         "thrust_coefficient": 1.3,
-        "added_mass": 2.5,
+        "normal_viscous_drag": 400.0,
+        "tangential_viscous_drag": 150.0,
     }
     return ms.Water(**{"fluid_density": RHO, **values, **(tables or {}), **changes})
 
 
 def random_faces(rng, count=40):
-    """Return corners of centimetres, velocities and accelerations of order one, each (n, 3, 3)."""
-    return 0.01 * rng.standard_normal((count, 3, 3)), *rng.standard_normal((2, count, 3, 3))
+    """Return corners of centimetres and velocities of order one, each (n, 3, 3)."""
+    return 0.01 * rng.standard_normal((count, 3, 3)), rng.standard_normal((count, 3, 3))
 
 
 def areas(x):
     return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)
 
 
-def kernel(water, x, v, w):
-    return _core.drag_faces(water._core, x, v, w)
+def kernel(water, x, v):
+    return _core.drag_faces(water._core, x, v)
 
 
 def close(actual, expected, tolerance):
@@ -92,9 +96,10 @@ def forces_at(angles, face, **water):
     x = np.broadcast_to(face, (len(angles), 3, 3))
     v = np.broadcast_to(-flow[:, None], x.shape)  # the water is at rest
     unit = 0.5 * RHO * AREA * SPEED**2
-    drag = ms.Water(thrust_coefficient=0, **water).force(x, v)
-    thrust = ms.Water(drag_coefficient=0, **water).force(x, v)
-    np.testing.assert_allclose(ms.Water(**water).force(x, v), drag + thrust, rtol=0, atol=1e-12 * unit)
+    drag = ms.Water(drag_coefficient=1, thrust_coefficient=0, **water).force(x, v)
+    thrust = ms.Water(drag_coefficient=0, thrust_coefficient=1, **water).force(x, v)
+    both = ms.Water(drag_coefficient=1, thrust_coefficient=1, **water).force(x, v)
+    np.testing.assert_allclose(both, drag + thrust, rtol=0, atol=1e-12 * unit)
     np.testing.assert_allclose(np.cross(drag, flow), 0, rtol=0, atol=1e-12 * unit)
     assert (thrust[:, :2] == 0).all()
     return (drag * flow).sum(axis=1) / SPEED / unit, -thrust[:, 2] / unit
@@ -105,7 +110,8 @@ def test_drag_and_thrust_have_the_published_values(face):
     drag, thrust = forces_at(G1_ANGLES, face)
     np.testing.assert_allclose(drag, 2 * G1[:, 2], rtol=0, atol=1e-12)
     np.testing.assert_allclose(thrust, 2 * G1[:, 3], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(ms.Water().coefficients(G1_ANGLES), [G1[:, 1]] * 2, rtol=0, atol=1e-12)
+    published = ms.Water(drag_coefficient=1, thrust_coefficient=1)
+    np.testing.assert_allclose(published.coefficients(G1_ANGLES), [G1[:, 1]] * 2, rtol=0, atol=1e-12)
 
 
 @orientations
@@ -114,12 +120,14 @@ def test_diffpd_tables_give_the_published_values(face):
     np.testing.assert_allclose(drag, G1[:, 4], rtol=0, atol=1e-12)
     np.testing.assert_allclose(thrust[1:], G1[1:, 5], rtol=0, atol=1e-12)
     assert thrust[0] == 0  # the thrust jumps from one side to the other; its mean is taken
-    np.testing.assert_allclose(ms.Water(**DIFFPD).coefficients(G1_ANGLES), G1[:, 4:].T, rtol=0, atol=1e-12)
+    water = ms.Water(drag_coefficient=1, thrust_coefficient=1, **DIFFPD)
+    np.testing.assert_allclose(water.coefficients(G1_ANGLES), G1[:, 4:].T, rtol=0, atol=1e-12)
 
 
 def test_half_the_drag_is_that_of_softcon():
     table = (G1_ANGLES, np.sin(G1_ANGLES) ** 2)
-    by_factor, by_table = ms.Water(drag_coefficient=0.5), ms.Water(attack_table=table)
+    by_factor = ms.Water(drag_coefficient=0.5)
+    by_table = ms.Water(drag_coefficient=1, attack_table=table)
     softcon = [0.0, 0.030153689607045786, 0.06698729810778065, 0.24999999999999994]
     softcon += [0.49999999999999994, 0.7499999999999999, 0.9698463103929542, 1.0]
     for water in (by_factor, by_table):
@@ -133,12 +141,19 @@ def test_face_on_is_twice_rho_a_v2(face):
     assert drag + thrust == pytest.approx(4.0, rel=1e-14)
 
 
+@orientations
+def test_default_is_the_pressure_on_a_square_plate(face):
+    """Compare with C = 1.18 of White's table 7.3, along the normal and by the velocity across the plate alone."""
+    flow = SPEED * np.array([np.cos(0.7), 0.0, -np.sin(0.7)])
+    force = ms.Water().force(face[None], np.broadcast_to(-flow, (1, 3, 3)))
+    pressure = 0.5 * RHO * 1.18 * flow[2] ** 2
+    np.testing.assert_allclose(force, [[0, 0, -pressure * AREA]], rtol=1e-14, atol=1e-15)
+
+
 @waters
 def test_forces_do_not_depend_on_the_orientation_of_faces(tables, rng):
-    x, v, w = random_faces(rng)
-    ours, turned = (
-        kernel(make(tables), a[:, i], v[:, i], w[:, i]) for a in [x] for i in ([0, 1, 2], [2, 1, 0])
-    )
+    x, v = random_faces(rng)
+    ours, turned = (kernel(make(tables), x[:, i], v[:, i]) for i in ([0, 1, 2], [2, 1, 0]))
     close(turned["corner_force"], ours["corner_force"], 1e-14)
     close(turned["by_position"][:, ::-1], ours["by_position"], 1e-14)
     close(turned["by_velocity"], ours["by_velocity"], 1e-14)
@@ -146,47 +161,52 @@ def test_forces_do_not_depend_on_the_orientation_of_faces(tables, rng):
 
 @waters
 def test_a_turned_or_mirrored_world(tables, rng):
-    x, v, w = random_faces(rng)
+    x, v = random_faces(rng)
     velocity = rng.standard_normal(3)
-    ours = make(tables, velocity=velocity).force(x, v, w)
+    ours = make(tables, velocity=velocity).force(x, v)
     turn = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
     for turned in (turn, turn @ np.diag([1, 1, -1])):
-        theirs = make(tables, velocity=turned @ velocity).force(x @ turned.T, v @ turned.T, w @ turned.T)
+        theirs = make(tables, velocity=turned @ velocity).force(x @ turned.T, v @ turned.T)
         close(theirs, ours @ turned.T, 1e-13)
 
 
 def test_a_moving_frame(rng):
-    x, v, w = random_faces(rng)
+    x, v = random_faces(rng)
     drift = np.array([1.0, 2.0, -3.0])
     ours, theirs = make(), make(velocity=make().velocity + drift)
-    close(theirs.force(x + drift, v + drift, w), ours.force(x, v, w), 1e-13)
+    close(theirs.force(x + drift, v + drift), ours.force(x, v), 1e-13)
 
 
 @waters
 def test_drag_dissipates_energy(tables, rng):
-    x, v, _ = random_faces(rng)
+    x, v = random_faces(rng)
     still = make(tables, velocity=(0, 0, 0))
     assert ((still.force(x, v) * v.mean(axis=1)).sum(axis=1) < 0).all()
 
 
 @waters
 def test_faces_moving_with_the_water_have_no_force(tables, rng):
-    x, _, _ = random_faces(rng)
+    x, _ = random_faces(rng)
     water = make(tables)
-    found = kernel(water, x, np.broadcast_to(water.velocity, x.shape), np.zeros_like(x))
-    for name in ("corner_force", "by_position", "by_velocity"):
+    found = kernel(water, x, np.broadcast_to(water.velocity, x.shape))
+    for name in ("corner_force", "by_position"):
         assert not found[name].any(), name
+    turbulent = make(tables, normal_viscous_drag=0, tangential_viscous_drag=0)
+    assert not kernel(turbulent, x, np.broadcast_to(water.velocity, x.shape))["by_velocity"].any()
 
 
 @waters
 @pytest.mark.parametrize("speed", [0.0, 1e-320, 1e-200, 1e-160, 1e-20])
 @pytest.mark.parametrize("size", [0.0, 1e-200, 1e-100, 1e-20])
 def test_no_nan_at_rest_or_without_area(tables, speed, size, rng):
-    x, v, w = random_faces(rng)
-    arguments = (size * x, speed * v, speed * w)
-    water = make(tables, velocity=(0, 0, 0))
+    x, v = random_faces(rng)
+    arguments = (size * x, speed * v)
+    water = make(tables, velocity=(0, 0, 0), normal_viscous_drag=0, tangential_viscous_drag=0)
     for values in kernel(water, *arguments).values():
         assert np.isfinite(values).all() and np.abs(values).max() < 1e-15
+    water = make(tables, velocity=(0, 0, 0))
+    for values in kernel(water, *arguments).values():
+        assert np.isfinite(values).all()
     for values in _core.drag_gradients(water._core, *arguments, np.ones((len(x), 3))).values():
         assert np.isfinite(values).all()
 
@@ -195,7 +215,7 @@ def test_no_nan_at_rest_or_without_area(tables, speed, size, rng):
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-17, 1e-9, 0.5 * np.pi - 1e-9, 0.5 * np.pi])
 def test_no_nan_along_or_head_on(tables, angle):
     flow = np.array([np.cos(angle), 0.0, -np.sin(angle)])
-    found = kernel(make(tables, velocity=flow), FACE[None], np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
+    found = kernel(make(tables, velocity=flow), FACE[None], np.zeros((1, 3, 3)))
     for values in found.values():
         assert np.isfinite(values).all() and np.abs(values).max() < 1e4
 
@@ -203,11 +223,10 @@ def test_no_nan_along_or_head_on(tables, angle):
 def test_a_smooth_table_is_differentiable_head_on():
     """Check that the Jacobian head on is the limit of those around it from every side."""
     water = make(WATERS["a smooth table"], velocity=(0, 0, 0))
-    still = np.zeros((1, 3, 3))
 
     def jacobian(tilt, heading):
         flow = [np.sin(tilt) * np.cos(heading), np.sin(tilt) * np.sin(heading), np.cos(tilt)]
-        found = kernel(water, FACE[None], np.broadcast_to(flow, (1, 3, 3)), still)
+        found = kernel(water, FACE[None], np.broadcast_to(flow, (1, 3, 3)))
         return np.concatenate([found["by_position"].ravel(), found["by_velocity"].ravel()])
 
     head_on = jacobian(0.0, 0.0)
@@ -216,22 +235,21 @@ def test_a_smooth_table_is_differentiable_head_on():
         close(jacobian(1e-12, heading), head_on, 1e-11)
 
 
-def packed(x, v, w):
-    """Return positions (9), mean velocity (3) and mean acceleration (3) of each face as rows (n, 15)."""
-    return np.concatenate([x.reshape(-1, 9), v.mean(axis=1), w.mean(axis=1)], axis=1)
+def packed(x, v):
+    """Return positions (9) and mean velocity (3) of each face as rows (n, 12)."""
+    return np.concatenate([x.reshape(-1, 9), v.mean(axis=1)], axis=1)
 
 
-def jacobian_of(water, x, v, w):
-    """Return the Jacobian of the force on each face by the variables of `packed`, (n, 3, 15)."""
-    found = kernel(water, x, v, w)
+def jacobian_of(water, x, v):
+    """Return the Jacobian of the force on each face by the variables of `packed`, (n, 3, 12)."""
+    found = kernel(water, x, v)
     by_position = found["by_position"].transpose(0, 2, 1, 3).reshape(-1, 3, 9)
-    return 3 * np.concatenate([by_position, found["by_velocity"], found["by_acceleration"]], axis=2)
+    return 3 * np.concatenate([by_position, found["by_velocity"]], axis=2)
 
 
 def force_of(water, z):
     x = z[:, :9].reshape(-1, 3, 3)
-    v, w = (np.broadcast_to(part[:, None], x.shape) for part in (z[:, 9:12], z[:, 12:]))
-    return water.force(x, v, w)
+    return water.force(x, np.broadcast_to(z[:, None, 9:], x.shape))
 
 
 @waters
@@ -239,9 +257,9 @@ def test_jacobians_against_differences(tables, rng):
     """Compare along every direction and along the one in which each component changes most."""
     faces = random_faces(rng, 20)
     water, z, jacobian = make(tables), packed(*faces), jacobian_of(make(tables), *faces)
-    scale = np.repeat([0.01, 1.0, 1.0], [9, 3, 3])  # of positions, velocities, accelerations
+    scale = np.repeat([0.01, 1.0], [9, 3])  # of positions, velocities
     steepest = jacobian * scale / np.linalg.norm(jacobian * scale, axis=2, keepdims=True)
-    directions = [np.broadcast_to(unit, z.shape) for unit in np.eye(15)] + list(steepest.transpose(1, 0, 2))
+    directions = [np.broadcast_to(unit, z.shape) for unit in np.eye(12)] + list(steepest.transpose(1, 0, 2))
     for direction in directions:
         step = 1e-6 * scale * direction
         difference = (force_of(water, z + step) - force_of(water, z - step)) / 2e-6
@@ -253,7 +271,7 @@ def test_gradients_against_differences(tables, rng):
     faces, multipliers = random_faces(rng, 20), rng.standard_normal((20, 3))
     water = make(tables)
     gradient = _core.drag_gradients(water._core, *faces, multipliers)
-    for name in ms.Water._replaceable:
+    for name in gradient:
         value = np.atleast_1d(getattr(water, name))
         for k in range(len(value)):
             step = np.zeros(len(value))
@@ -266,8 +284,8 @@ def test_gradients_against_differences(tables, rng):
             close(gradient[name].reshape(20, -1)[:, k], difference, 2e-7)
 
 
-def formula(x, v, w, rho, velocity, drag_coefficient, thrust_coefficient, added_mass, c_drag, c_thrust):
-    """Compute [Chen22] (42)-(44) for one face as printed, in torch; c_... are functions of phi.
+def formula(x, v, rho, velocity, drag_coefficient, thrust_coefficient, normal, tangential, c_drag, c_thrust):
+    """Compute [Chen22] (42)-(44) for one face as printed, in torch, and viscous drag; c_... are functions of phi.
 
     The normal n is turned against the flow.
     """
@@ -282,7 +300,8 @@ def formula(x, v, w, rho, velocity, drag_coefficient, thrust_coefficient, added_
     phi = torch.abs(torch.pi / 2 - torch.acos(n @ d))
     drag = 0.5 * rho * area * drag_coefficient * c_drag(phi) * speed**2 * d
     thrust = -0.5 * rho * area * thrust_coefficient * c_thrust(phi) * speed**2 * n
-    return drag + thrust - added_mass * area * (n @ w) * n
+    across = (n @ flow) * n
+    return drag + thrust + area * (normal * across + tangential * (flow - across))
 
 
 @pytest.mark.parametrize("name", ["as printed", "DiffPD"])
@@ -293,16 +312,17 @@ def test_a_second_formula(name, rng):
     multipliers = rng.standard_normal((12, 3))
     force, jacobian = water.force(*faces), jacobian_of(water, *faces)
     gradient = _core.drag_gradients(water._core, *faces, multipliers)
-    names = ms.Water._replaceable
+    names = tuple(name for name in ms.Water._replaceable if name != "added_mass")
+    assert set(names) == set(gradient)
     numbers = tuple(torch.tensor(getattr(water, name), dtype=torch.float64) for name in names)
     for f, z in enumerate(torch.tensor(packed(*faces))):
 
         def by_motion(z):
-            return formula(z[:9].reshape(3, 3), z[9:12], z[12:], *numbers, *curves)
+            return formula(z[:9].reshape(3, 3), z[9:], *numbers, *curves)
 
         def by_water(*values, z=z, f=f):
-            x, v, w = z[:9].reshape(3, 3), z[9:12], z[12:]
-            return torch.tensor(multipliers[f]) @ formula(x, v, w, *values, *curves)
+            x, v = z[:9].reshape(3, 3), z[9:]
+            return torch.tensor(multipliers[f]) @ formula(x, v, *values, *curves)
 
         close(force[f], by_motion(z).numpy(), 1e-12)
         close(jacobian[f], torch.autograd.functional.jacobian(by_motion, z).numpy(), 1e-11)
@@ -312,18 +332,10 @@ def test_a_second_formula(name, rng):
             )
 
 
-def test_added_mass_resists_along_the_normal():
-    """Check 5 kg/m2 on 0.055 m2 for both orientations: a force along the normal and none within the face."""
-    for face in FACES.values():
-        w = np.broadcast_to([3.0, -1.0, 2.0], (1, 3, 3))
-        force = ms.Water(added_mass=5.0).force(face[None], np.zeros((1, 3, 3)), w)
-        np.testing.assert_allclose(force, [[0, 0, -5.0 * AREA * 2.0]], rtol=1e-14, atol=1e-15)
-
-
 def test_a_plate_that_falls():
     """Compare with v_T tanh(t / T) of the docstring, with a heavy added mass and coefficients of a table."""
     areal_mass, gravity, added_mass = 1.2, 9.81, 0.8
-    water = ms.Water(drag_coefficient=0.6, added_mass=added_mass, **DIFFPD)
+    water = ms.Water(drag_coefficient=0.6, thrust_coefficient=1.0, added_mass=added_mass, **DIFFPD)
     c_d, c_t = (float(c) for c in water.coefficients(np.pi / 2))
     terminal = np.sqrt(2 * areal_mass * gravity / (RHO * (c_d + c_t)))
     time = terminal * (areal_mass + added_mass) / (areal_mass * gravity)

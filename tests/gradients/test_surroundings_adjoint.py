@@ -31,6 +31,8 @@ OF_WATER = {
     "drag_coefficient": np.array(0.9),
     "thrust_coefficient": np.array(0.7),
     "added_mass": np.array(0.6),
+    "normal_viscous_drag": np.array(20.0),
+    "tangential_viscous_drag": np.array(8.0),
 }
 STICKING = 5e-3  # m/s
 
@@ -159,6 +161,7 @@ CASES = {
     ),
     "euler, moving ball, factors": Case(ball, motion=swaying, options={"adjoint_storage": "factors"}),
     "euler, water": Case(None, water=True),
+    "implicit contact, water and plane": Case(integrator=ms.TRBDF2(implicit_contact=True), water=True),
     "sdirk3, water": Case(None, ms.SDIRK3(), water=True, options={"adjoint_storage": "factors"}),
     "tr_bdf2, water and plane, checkpoints": Case(
         integrator=ms.TRBDF2(),
@@ -300,7 +303,9 @@ def sliding_into_a_corner():
     contact = ms.Contact(
         slope, friction_coefficient=0.3, sticking_speed=STICKING, smoothing=1e-4, contact_stiffness=50.0
     )
-    water = ms.Water(velocity=turn @ [0.1, 0.02, -0.05], added_mass=0.5)
+    water = ms.Water(
+        velocity=turn @ [0.1, 0.02, -0.05], drag_coefficient=1, thrust_coefficient=1, added_mass=0.5
+    )
     side = ms.SymmetryPlane(turn[:, 1])
     scene = ms.Scene(
         sheet,

@@ -135,10 +135,16 @@ def _in_scenes(s: Sample) -> Iterator[Call]:
         "attack_table": table,
         "thrust_table": table,
         "added_mass": 0.1,
+        "normal_viscous_drag": 1.0,
+        "tangential_viscous_drag": 0.5,
     }
     yield Call("Water", lambda **a: moved(water=ms.Water(**a)), flow)
     water = ms.Water()
     yield Call("Water.coefficients", water.coefficients, {"attack_angle": np.array([0.1, 0.2])})
     triangles = s.positions[s.mesh.faces[:2]]
-    motion = {"positions": triangles, "velocities": triangles, "accelerations": None}
-    yield Call("Water.force", water.force, motion)
+    motion = {"positions": triangles, "velocities": triangles}
+    yield Call("Water.force", water.force, {**motion, "accelerations": None})
+    yield Call("Water.momentum", water.momentum, motion)
+    yield Call("Water.kinetic_energy", water.kinetic_energy, motion)
+    strip = {"viscosity": 1e-3, "length": 1e-2, "width": 1e-3}
+    yield Call("Water.viscous", lambda **a: ms.Water.viscous(**a), strip)

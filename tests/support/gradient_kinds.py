@@ -59,6 +59,7 @@ from gradient_world import (
     EXACT,
     FACTORS,
     IN_TIME,
+    IN_WATER,
     MIDDLE,
     REACH,
     RNG,
@@ -198,9 +199,7 @@ def thrown(
         contacts = [ms.Contact(under(shape, -2e-3, motion=motion), **law)]
     water = None
     if swims:
-        water = ms.Water(
-            800.0, (0.05, -0.02, 0.01), drag_coefficient=0.9, thrust_coefficient=0.7, added_mass=0.6
-        )
+        water = ms.Water(800.0, (0.05, -0.02, 0.01), **IN_WATER)
     scene = ms.Scene(
         sheet,
         contacts=contacts,
@@ -235,7 +234,7 @@ def in_a_corner() -> Kind:
         sheet,
         supports=[ms.SymmetryPlane(turn[:, 1])],
         contacts=[ms.Contact(slope, friction_coefficient=0.3, contact_stiffness=50.0, offset=1e-4)],
-        water=ms.Water(velocity=turn @ [0.1, 0.02, -0.05], added_mass=0.5),
+        water=ms.Water(velocity=turn @ [0.1, 0.02, -0.05], **IN_WATER),
         gravity=turn @ [2, 0, -9.81],
         allow_rigid_motions=True,
     )
@@ -379,6 +378,9 @@ MAKERS = {
     ),
     "through water": lambda: thrown(None, ms.TRBDF2(), swims=True),
     "through water onto a Plane": lambda: thrown(ob.Plane, ms.TRBDF2(), True, extra=VISCOUS, **RUBS),
+    "through water onto a Plane, contact implicit": lambda: thrown(
+        ob.Plane, ms.TRBDF2(implicit_contact=True), True, **RUBS
+    ),
     "in a corner": in_a_corner,
     "two sheets at rest": two_sheets_at_rest,
     "a solid with a sheet and a magnet at rest": lambda: solid_with_company(False),

@@ -3,7 +3,7 @@
 import numpy as np
 from adjoint_scenes import DEFAULTS, DIPOLES, MESH, N_V
 from gradient_scenes import Kind
-from gradient_world import EXACT, FACTORS, IN_TIME, MIDDLE, REACH, RNG, STEPS, VISCOUS, under
+from gradient_world import EXACT, FACTORS, IN_TIME, IN_WATER, MIDDLE, REACH, RNG, STEPS, VISCOUS, under
 
 import magshell as ms
 from magshell import obstacles as ob
@@ -122,7 +122,7 @@ def two_sheets_in_motion() -> Kind:
         contacts=[rubbing],
         field=ms.UniformField(),
         gravity=(0, 0.3, -9.81),
-        water=ms.Water(800.0, (0.05, -0.02, 0.01), added_mass=0.6),
+        water=ms.Water(800.0, (0.05, -0.02, 0.01), **IN_WATER),
         allow_rigid_motions=True,
     )
     n_v = scene.mesh.n_vertices
@@ -257,7 +257,7 @@ def magnetized_solid_at_rest() -> Kind:
 def magnetized_solid_in_motion() -> Kind:
     """Build a motion of a magnetized solid in water, which acts on its surface."""
     body, held = _magnetized_block("linear")
-    water = ms.Water(800.0, (0.05, -0.02, 0.01), added_mass=0.6)
+    water = ms.Water(800.0, (0.05, -0.02, 0.01), **IN_WATER)
     scene = ms.Scene(body, supports=[held], field=[ms.UniformField(), DIPOLES], water=water)
     flux = np.array((2e-3, -3e-3, 1e-2)) * RNG.uniform(0.5, 1.5, (4, 3))
     fixed = {"steps": 3, "integrator": ms.TRBDF2(), "progress": False, **EXACT}

@@ -3,7 +3,7 @@
 import numpy as np
 from adjoint_scenes import DIPOLES, MESH
 from gradient_scenes import Kind
-from gradient_world import EXACT, FACTORS, REACH, RNG, under
+from gradient_world import EXACT, FACTORS, IN_WATER, REACH, RNG, under
 
 import magshell as ms
 from magshell import obstacles as ob
@@ -82,7 +82,7 @@ def six_nodes_in_motion() -> Kind:
         contacts=[rubbing],
         field=ms.UniformField(),
         gravity=(0, 0.3, -9.81),
-        water=ms.Water(800.0, (0.05, -0.02, 0.01), added_mass=0.6),
+        water=ms.Water(800.0, (0.05, -0.02, 0.01), **IN_WATER),
         allow_rigid_motions=True,
     )
     n_v = sheet.mesh.n_vertices

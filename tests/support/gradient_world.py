@@ -30,6 +30,14 @@ VISCOUS = {
     "maxwell_modulus": np.array((0.5, 0.2)),
     "maxwell_time": np.array((4e-3, 1.5e-2)),
 }
+# Of ms.Water: with a lower bound of zero, differences need values away from it.
+IN_WATER = {
+    "drag_coefficient": 0.9,
+    "thrust_coefficient": 0.7,
+    "added_mass": 0.6,
+    "normal_viscous_drag": 200.0,
+    "tangential_viscous_drag": 80.0,
+}
 IN_TIME = {
     "applied_flux_density": np.array((1e-3, -2e-3, 3e-3)) * RNG.uniform(0.5, 1.5, (STEPS + 1, 3)),
     "load_factor": RNG.uniform(0, 1, STEPS),

@@ -101,8 +101,11 @@ class Backward {
 
     // The gradient with respect to the start of a stage, or of the nearby state at which motor forces are evaluated.
     struct BeforeStage {
-        VectorXd x_hat, v_hat;
+        VectorXd x_hat, v_hat, p_hat;
         double dt = 0.0;
+
+        explicit BeforeStage(Index size)
+            : x_hat(VectorXd::Zero(size)), v_hat(VectorXd::Zero(size)), p_hat(VectorXd::Zero(size)) {}
     };
 
     // Adds the contribution of lambda, at a state with these rates, to the gradients with respect to inertia, by forces, and by the start
@@ -120,11 +123,20 @@ class Backward {
         by.x_hat -= algebra.weights().cwiseProduct(lambda);
         by.v_hat -= mass.cwiseProduct(lambda) / adt;
         if (!model_.capabilities().has_velocity_forces) return;  // - f(x, (x - x^)/(a dt), ...)
-        const VectorXd by_rate = by_forces.velocity + by_forces.acceleration / adt;
-        by.x_hat += by_rate / adt;
-        by.v_hat += by_forces.acceleration / adt;
-        by.dt += (by_rate.dot(v) + by_forces.acceleration.dot(w)) / dt;
+        by.x_hat += by_forces.velocity / adt;
+        by.dt += (by_forces.velocity.dot(v) - by_forces.time * adt) / dt;
+        if (by_forces.p_hat.size() > 0) by.p_hat -= by_forces.p_hat;
         g_.positions -= by_forces.begin;
+    }
+
+    // Adds the gradients of by_momentum . p(q, v), the carried momentum at a fraction of a step, with respect to q, v and the scene.
+    void through_momentum(Index step, double fraction, const VectorXd& q, const VectorXd& v,
+                          const VectorXd& by_momentum, VectorXd& by_q, VectorXd& by_v) {
+        model_.parameters().set_time_varying(input_.load_parameters_at(step, fraction));
+        scene_.load_parameters.setZero();
+        model_.parameters().momentum_vjp(q, v, by_momentum, by_q, by_v, scene_);
+        model_.parameters().time_varying().move_gradient(scene_);
+        add_by_load_parameters(step, fraction, scene_.load_parameters);
     }
 
     // Computes the adjoint of a substep, stage by stage, by the formulas of dynamic.h. adt: a dt.
@@ -137,18 +149,25 @@ class Backward {
         const int n = tableau.stages, first = tableau.begins_explicitly ? 1 : 0;
         const double dt = algebra.dt(), adt = algebra.stage_time();
         const Index coordinates = model_.n_coordinates();
-        const StepRates at(model_, algebra, stepper_.free_bodies(), record);
+        const std::vector<LoadParameters> load_parameters =
+            stage_load_parameters(input_, tableau, step, substep);
+        const StepRates at(model_, algebra, stepper_.free_bodies(), record, load_parameters);
         FreeFlightAdjoint flight(at.flight);
 
-        std::vector<VectorXd> by_v(first + n, VectorXd::Zero(model_.size())), by_w = by_v;
+        const bool carries = model_.may_carry_momentum();
+        std::vector<VectorXd> by_v(first + n, VectorXd::Zero(model_.size())), by_w = by_v, by_r;
+        VectorXd by_momentum;  // by the carried momentum at the beginning
+        if (carries) {
+            by_r = by_v;
+            by_momentum = by_v.front();
+            if (by_r_.size() > 0) by_r.back() = std::move(by_r_);
+        }
         VectorXd by_x = std::move(g_.positions);
         by_v.back() = std::move(g_.velocities);
         if (by_w_.size() > 0) by_w.back() = std::move(by_w_);
         flight.through_finish(record.stages.back().q, at.all.back().v, by_w.back(), by_v.back(), by_x,
                               g_.mass);
         g_.positions = g_.velocities = VectorXd::Zero(model_.size());
-        const std::vector<LoadParameters> load_parameters =
-            stage_load_parameters(input_, tableau, step, substep);
         Viscous viscous{{model_, model_.elastic(), input_.viscosity, &StageRates::elastic, algebra, record,
                          load_parameters, by_strains_},
                         {model_,
@@ -163,7 +182,7 @@ class Backward {
         by_dt_before_ = 0.0;
         const VectorXd by_earlier = std::move(by_v_before_);
         by_v_before_ = VectorXd();
-        BeforeStage by_end{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
+        BeforeStage by_end(model_.size());
         // Gradients with respect to w and c of the last stage that come from the motor forces; by_c: by c of the present stage.
         VectorXd by_w_last = VectorXd::Zero(model_.size()), by_c_last = by_w_last, by_c;
         if (by_motor_forces.size() > 0)
@@ -172,6 +191,15 @@ class Backward {
         for (int i = n - 1; i >= 0; --i) {
             const VectorXd& v = at.all[first + i].v;
             const VectorXd w = algebra.stage_acceleration(at.all[first + i], at.v_hat[i]);
+            const double there = substep.begin + tableau.time(i) * fraction;
+            BeforeStage by(model_.size());
+            if (i == n - 1) by = std::move(by_end);
+            if (carries) {
+                const VectorXd by_p = by_r[first + i] / adt;
+                by.p_hat -= by_p;
+                by.dt -= by_r[first + i].dot(at.all[first + i].momentum_rate) / dt;
+                through_momentum(step, there, record.stages[i].q, v, by_p, by_x, by_v[first + i]);
+            }
             // Gradients with respect to e_i, the acceleration without contact, and to w_i = e_i + F c_i, the one with it (dynamic.h).
             const VectorXd& by_ei = by_w[first + i];
             const VectorXd by_wi = i == n - 1 ? VectorXd(by_ei + by_w_last) : by_ei;
@@ -180,8 +208,6 @@ class Backward {
                 by_c = -tableau.contact_factor(i) * by_ei;
                 if (i == n - 1) by_c += by_c_last;
             }
-            BeforeStage by{VectorXd::Zero(model_.size()), VectorXd::Zero(model_.size())};
-            if (i == n - 1) by = std::move(by_end);
             by.dt -= (by_wi.dot(w) + by_vi.dot(v)) / dt;
             by.v_hat -= by_wi / adt;
             by_x.head(coordinates) += by_vi.head(coordinates) / adt;
@@ -190,11 +216,9 @@ class Backward {
             const auto [lambda, by_forces] =
                 back_through(algebra, at, i, record, step, substep, by_x, by_c, viscous);
             through_rates(algebra, lambda, by_forces, v, w, by);
-            if (by_.wants_stages) {
-                const double there = substep.begin + tableau.time(i) * fraction;
+            if (by_.wants_stages)
                 g_.stages.push_back(
                     {lambda, record.stages[i].q, v, w, input_.load_parameters_at(step, there)});
-            }
 
             by_dt += by.dt;
             g_.positions += by.x_hat;
@@ -205,14 +229,22 @@ class Backward {
                 by_v[j] += (dt * a) * by.x_hat;
                 by_w[j] += (dt * a) * by.v_hat;
                 by_dt += a * (at.all[j].v.dot(by.x_hat) + at.all[j].acceleration.dot(by.v_hat));
+                if (!carries) continue;
+                by_r[j] += (dt * a) * by.p_hat;
+                by_dt += a * at.all[j].momentum_rate.dot(by.p_hat);
             }
+            if (carries) by_momentum += by.p_hat;
             by_x.setZero(model_.size());
         }
-        by_w_ = VectorXd();
+        by_w_ = by_r_ = VectorXd();
         if (tableau.begins_explicitly) {
             g_.velocities += by_v.front();
             by_w_ = std::move(by_w.front());
+            if (carries) by_r_ = std::move(by_r.front());
         }
+        if (carries)
+            through_momentum(step, substep.begin, record.begin.q, record.begin.v, by_momentum, g_.positions,
+                             g_.velocities);
         flight.add_by_begin(record.begin.q, record.begin.v, g_.positions, g_.velocities, g_.mass, by_dt,
                             g_.rest.asked ? &g_.rest.by_nodes : nullptr);
         if (input_.viscosity.any()) {
@@ -316,7 +348,7 @@ class Backward {
         const double fraction = substep.begin + algebra.tableau().time(i) * substep.fraction();
         const LoadParameters load_parameters = input_.load_parameters_at(step, fraction);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
-        const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
+        const StageMotion motion{&at.x_hat[i], &at.p_hat[i], algebra.stage_time()};
         set_stage(algebra, record, i, step, substep, load_parameters, viscous);
         const ProximalTerm proximal{&algebra.weights(), &target, &motion};
         newton_.evaluate(stage.q, load_parameters, proximal);
@@ -345,7 +377,7 @@ class Backward {
         const ScopedStrainHistory elastic_afterwards(model_);
         const LoadParameters load_parameters = input_.load_parameters_at(step, substep.end);
         const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
-        const StageMotion motion{&at.x_hat[i], &at.v_hat[i], algebra.stage_time()};
+        const StageMotion motion{&at.x_hat[i], &at.p_hat[i], algebra.stage_time()};
         const ScopedContactFactor usual_contact_afterwards(model_);
         set_stage(algebra, record, i, step, substep, load_parameters, viscous);
         const ProximalTerm there{&algebra.weights(), &target, &motion};
@@ -495,8 +527,8 @@ class Backward {
     const GradientsByStates& by_;
     Stepper stepper_;
     Gradient scene_;  // by all parameters, and by the load parameters of the current stage
-    // By the acceleration with which the last step processed begins; empty if its method needs none.
-    VectorXd by_w_;
+    // By the acceleration with which the last step processed begins, and the rate of the carried momentum; empty if its method needs none.
+    VectorXd by_w_, by_r_;
     // By the velocity at the beginning of the step before that; empty if nothing depends on it.
     VectorXd by_v_before_;
     double by_dt_before_ = 0.0;   // by the length of the substep before the last one processed

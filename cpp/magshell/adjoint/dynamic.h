@@ -5,6 +5,7 @@
 //       x'_i += v'_i/(a dt),  x^'_i -= v'_i/(a dt)
 //   (W + H) lambda_i = - x'_i:
 //       x^'_i -= W lambda_i,  v^'_i -= M/(a dt) lambda_i,  k' += lambda_i . dg/dk
+//   r_i = (p_i - p^_i)/(a dt) of carried momentum likewise: p'_i = (r'_i + lambda_i)/(a dt), p^'_i = - p'_i, and p^_i = p + dt sum a_ij r_j
 //   (with viscosity, the strains d and e are treated likewise, see solve/motion/viscosity.h)
 //   x^_i = x + dt sum a_ij v_j,  v^_i = v + dt sum a_ij w_j:
 //       x' += x^'_i,  v' += v^'_i,  v'_j += dt a_ij x^'_i,  w'_j += dt a_ij v^'_i

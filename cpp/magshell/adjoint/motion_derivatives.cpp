@@ -170,8 +170,8 @@ ForceTangent MotionDerivatives::forces(const StageTangent& stage, const VectorXd
         if (moving) begin_step(there, stage, t);
         there.contacts().set_factor(stage.contact_factor);
         const VectorXd x_hat = stage.x_hat + t * stage.x_hat_tangent,
-                       v_hat = stage.v_hat + t * stage.v_hat_tangent;
-        const StageMotion motion{&x_hat, &v_hat, stage.T + t * stage.T_tangent};
+                       p_hat = stage.p_hat + t * stage.p_hat_tangent;
+        const StageMotion motion{&x_hat, &p_hat, stage.T + t * stage.T_tangent};
         VectorXd gradient;
         if (changing_ && !moving) {
             gradient = changing_->at(q, at);
@@ -187,7 +187,6 @@ ForceTangent MotionDerivatives::forces(const StageTangent& stage, const VectorXd
     if (moving)
         step = step_along({{along_.length, largest(stage.q_begin_tangent)},
                            {along_.length, largest(stage.x_hat_tangent)},
-                           {along_.length / stage.T, largest(stage.v_hat_tangent)},
                            {stage.T, std::abs(stage.T_tangent)}});
     // Each step makes models in other rest shapes: powers of two let many stages share them.
     if (reshapes_) step = std::exp2(std::floor(std::log2(step)));
@@ -226,6 +225,21 @@ PrescribedTangent MotionDerivatives::prescribed(const StageTangent& stage, const
     model_.linearize(q);
     if (!joints) return {VectorXd::Zero(n), all, {}};
     return {all.head(n), all.segment(n, n), all.tail(all.size() - 2 * n)};
+}
+
+VectorXd MotionDerivatives::carried_momentum(const VectorXd& q, const VectorXd& v, const VectorXd& q_tangent,
+                                             const VectorXd& v_tangent, const LoadParameters& load_parameters,
+                                             const LoadParameters& tangent) {
+    if (!model_.may_carry_momentum()) return {};
+    const VectorXd found = momentum_.of(
+        [&](double t) {
+            const Model& there = set(t, load_parameters + t * tangent);
+            return there.carried_momentum(q + t * q_tangent, v + t * v_tangent);
+        },
+        step_along({{along_.length, largest(q_tangent)}, {largest(v), largest(v_tangent)}}), 0.0,
+        "the momentum of water");
+    set(0.0, load_parameters);
+    return found;
 }
 
 StrainSet MotionDerivatives::damper_rates(const MotionState& begin, const VectorXd& q_tangent,

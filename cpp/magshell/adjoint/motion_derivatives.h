@@ -16,8 +16,8 @@ namespace magshell {
 /// A stage of a step, with the derivatives (tangents) of the quantities with which it begins. Names as in motion_tangent.h.
 struct StageTangent {
     const SubstepRecord& record;
-    const VectorXd &x_hat, &v_hat;  // predictions of x and v
-    const VectorXd &x_hat_tangent, &v_hat_tangent;
+    const VectorXd &x_hat, &v_hat, &p_hat;  // predictions of x, v and the carried momentum
+    const VectorXd &x_hat_tangent, &v_hat_tangent, &p_hat_tangent;
     const Model::AngleBranches& angle_branches;
     double T, T_tangent;  // [s] a dt, the time of the stage
     double contact_factor;
@@ -68,6 +68,10 @@ class MotionDerivatives {
     /// Returns the derivative of the strains at q, the state evaluated last, along a motion and by the inputs.
     StrainSet strains(ViscousTerms& terms, const VectorXd& q, const VectorXd& motion,
                       const LoadParameters& load_parameters, const LoadParameters& tangent);
+    /// Returns the derivative of the momentum that forces carry at q and v; empty if none may.
+    VectorXd carried_momentum(const VectorXd& q, const VectorXd& v, const VectorXd& q_tangent,
+                              const VectorXd& v_tangent, const LoadParameters& load_parameters,
+                              const LoadParameters& tangent);
     /// Returns the derivative of the strain rates of joint dampers at the beginning of a step, for the tangents of q and v there.
     StrainSet damper_rates(const MotionState& begin, const VectorXd& q_tangent, const VectorXd& v_tangent,
                            const LoadParameters& load_parameters, const LoadParameters& tangent);
@@ -98,7 +102,7 @@ class MotionDerivatives {
     std::map<double, Reshaped> reshaped_;      // by their place along the direction
     VectorXd unit_;                            // of forces on all dofs: moments count over the shortest edge
     std::map<double, VectorXd> known_values_;  // by their place along the direction
-    DirectionalDerivative forces_, energy_, strains_, prescribed_, dampers_;
+    DirectionalDerivative forces_, energy_, strains_, prescribed_, dampers_, momentum_;
 };
 
 /// Returns vectors one after another.

@@ -143,6 +143,7 @@ class ForwardSweep {
         if (!explicit_first) return;
         tangent_.rates.acceleration = VectorXd::Zero(q.size());
         if (start.rates.c.size() > 0) tangent_.rates.c = VectorXd::Zero(q.size());
+        if (start.rates.momentum_rate.size() > 0) tangent_.rates.momentum_rate = VectorXd::Zero(q.size());
         tangent_.rates.elastic.d = model_.elastic().zeros();
         tangent_.rates.elastic.e.assign(input_.viscosity.branches.size(), model_.elastic().zeros());
     }
@@ -224,7 +225,8 @@ class ForwardSweep {
                              begin_tangent = load_tangent(step, part.begin);
         derivatives_.set(0.0, begin);
         model_.set_angle_branches(record.begin.angle_branches);
-        const StepRates at(model_, algebra, stepper_.free_bodies(), record);
+        const StepRates at(model_, algebra, stepper_.free_bodies(), record,
+                           stage_load_parameters(input_, tableau, step, part));
         const VectorXd flight =
             at.flight.any() ? flight_tangent(algebra, dt_tangent, record.begin) : VectorXd();
 
@@ -250,13 +252,18 @@ class ForwardSweep {
                 derivatives_.strains(model_.dampers(), record.begin.q, tangent_.q, begin, begin_tangent), {},
                 {}, first ? &at.all.front() : nullptr, first ? &tangents.front() : nullptr);
 
+        const VectorXd momentum_tangent = derivatives_.carried_momentum(
+            record.begin.q, record.begin.v, tangent_.q, tangent_.v, begin, begin_tangent);
         VectorXd q_tangent, motor_forces;
         for (int i = 0; i < n; ++i) {
-            VectorXd x_hat_tangent = tangent_.q, v_hat_tangent = tangent_.v;
+            VectorXd x_hat_tangent = tangent_.q, v_hat_tangent = tangent_.v, p_hat_tangent = momentum_tangent;
             for (std::size_t j = 0; j < tangents.size(); ++j) {
                 const double a = tableau.a[i][j];
                 x_hat_tangent += a * (dt * tangents[j].v + dt_tangent * at.all[j].v);
                 v_hat_tangent += a * (dt * tangents[j].acceleration + dt_tangent * at.all[j].acceleration);
+                if (p_hat_tangent.size() > 0)
+                    p_hat_tangent +=
+                        a * (dt * tangents[j].momentum_rate + dt_tangent * at.all[j].momentum_rate);
             }
             if (flight.size() > 0) {
                 x_hat_tangent += flight.segment(2 * i * size, size);
@@ -269,8 +276,10 @@ class ForwardSweep {
             const StageTangent stage{record,
                                      at.x_hat[i],
                                      at.v_hat[i],
+                                     at.p_hat[i],
                                      from_vertices,
                                      v_hat_tangent,
+                                     p_hat_tangent,
                                      record.stages[i].angle_branches,
                                      T,
                                      T_tangent,
@@ -284,7 +293,7 @@ class ForwardSweep {
             const VectorXd& v = at.all[first + i].v;
             const VectorXd w = algebra.stage_acceleration(at.all[first + i], at.v_hat[i]);
             const VectorXd target = algebra.target(at.x_hat[i], at.v_hat[i]);
-            const StageMotion motion{&at.x_hat[i], &at.v_hat[i], T};
+            const StageMotion motion{&at.x_hat[i], &at.p_hat[i], T};
             const ProximalTerm proximal{&algebra.weights(), &target, &motion};
             derivatives_.set_stage(stage);
             strains.set_history(i);
@@ -306,6 +315,11 @@ class ForwardSweep {
                                                      record.stages[i].contact);
                 now.acceleration -= stage.contact_factor * now.c;
             }
+            if (p_hat_tangent.size() > 0)
+                now.momentum_rate = (derivatives_.carried_momentum(q, v, q_tangent, now.v,
+                                                                   stage.load_parameters, stage.tangent) -
+                                     p_hat_tangent - T_tangent * at.all[first + i].momentum_rate) /
+                                    T;
             if (!strains.idle())
                 strains.finish(model_.elastic().strains(q),
                                derivatives_.strains(model_.elastic(), q, q_tangent, stage.load_parameters,

@@ -5,7 +5,7 @@
 //   (W + H) dx_i = - (r + (H + W) dx_h)
 //       r: change of the residual of the stage at the fixed x_i, by x^_i, v^_i, masses, forces and strain history
 //       dx_h: the change of x that supports and motors prescribe
-//   dv_i = d((x_i - x^_i)/(a dt)),  dw_i = d((v_i - v^_i)/(a dt))
+//   dv_i = d((x_i - x^_i)/(a dt)),  dw_i = d((v_i - v^_i)/(a dt)),  and dr_i = d((p_i - p^_i)/(a dt)) of carried momentum
 //
 // The derivative of the forces with respect to the inputs is a central difference along the direction (directional_derivative.h), whose cost
 // does not depend on the number of inputs; inertia and strain history are differentiated exactly. A stage is solved with the factorization

@@ -55,6 +55,11 @@ class NonsymmetricTangent {
     void add(const SkewBlock& skew) { skew_blocks_.push_back(skew); }
     /// Appends a pair block and returns it for the caller to fill; the reference is valid until the next call.
     PairBlock& append_pair() { return pair_blocks_.emplace_back(); }
+    /// Appends `count` pair blocks and returns the first for the caller to fill; the pointer is valid until the next call.
+    PairBlock* append_pairs(std::size_t count) {
+        pair_blocks_.resize(pair_blocks_.size() + count);
+        return pair_blocks_.data() + pair_blocks_.size() - count;
+    }
     /// Appends `count` face blocks and returns the first for the caller to fill; the pointer is valid until the next call.
     FaceBlock* append_face_blocks(std::size_t count) {
         face_blocks_.resize(face_blocks_.size() + count);

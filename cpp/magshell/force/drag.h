@@ -1,16 +1,17 @@
-// Drag: the force of surrounding water on a moving face: drag, thrust and added mass.
+// Drag: the force of surrounding water on a moving face: drag, thrust and viscous drag.
 //
-//   f = 1/2 rho A (C_d(phi) |u|^2 d - C_t(phi) |u|^2 n) - m A (n . w) n        [N]   [Chen22] (42), (43)
+//   f = 1/2 rho A (C_d(phi) |u|^2 d - C_t(phi) |u|^2 n)                        [N]   [Chen22] (42), (43)
+//     + A (b_n n n^T + b_t (I - n n^T)) u            resistive-force theory [Gray55]
 //
 // with the flow u relative to the face (the water's velocity minus the mean velocity of the corners), its
-// direction d, the current area A and unit normal n, the mean acceleration w of the corners, and the added mass
-// m [kg/m2]. A third of f acts on each corner.
+// direction d, the current area A and unit normal n, and the coefficients b of viscous drag [N s/m3]. A third of f
+// acts on each corner. The inertia of the water is in added_mass.h.
 //
 // n is oriented against the flow, n . u <= 0, so that both sides of a face behave alike: the printed equations
 // leave the sign open, and drag and thrust would cancel on one of the sides. With the face's own normal n, s =
-// n . d in [-1, 1] and k the sign of s, this is
+// n . d in [-1, 1] and k the sign of s, drag and thrust are
 //
-//   f = 1/2 rho A |u|^2 (D d + T n) - m A (n . w) n,    sin phi = |s|,   D = C_d(phi),   T = k C_t(phi)
+//   f = 1/2 rho A |u|^2 (D d + T n),    sin phi = |s|,   D = C_d(phi),   T = k C_t(phi)
 //
 // Derivatives use the signed angle psi = k phi, of which D is an even function and T an odd one. With c = cos
 // phi and unit vectors e_u, e_n along the part of n perpendicular to d and of d perpendicular to n,
@@ -24,10 +25,9 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
-#include "magshell/core/types.h"
+#include "magshell/force/moving_face.h"
 
 namespace magshell {
 
@@ -73,54 +73,47 @@ struct Water {
     Vec3 velocity = Vec3::Zero();   // [m/s]
     double drag_coefficient = 1.0;  // C_d = drag_coefficient * drag_curve(phi), C_t likewise
     double thrust_coefficient = 1.0;
-    double added_mass = 0.0;  // m, for motion along the normal [kg/m2]
+    double added_mass = 0.0;               // m, for motion along the normal [kg/m2]
+    double normal_viscous_drag = 0.0;      // b_n, for flow across a face [N s/m3]
+    double tangential_viscous_drag = 0.0;  // b_t, for flow along it [N s/m3]
     AttackCurve drag_curve, thrust_curve;
 };
 
-/// The force of water on one face. Stores a reference to the water, which must outlive it.
+/// The force of water on one face. Stores references to the water and the face, which must outlive it.
 class Drag {
   public:
-    using Corners = std::array<Vec3, 3>;
-
-    /// The Jacobian of the force on each corner. The velocity or acceleration of a single corner counts a
-    /// third.
+    /// The Jacobian of the force on each corner. The velocity of a single corner counts a third.
     struct Jacobian {
         std::array<Mat3, 3> by_position;  // by the position of each corner               [N/m]
         Mat3 by_velocity;                 // by the corners' mean velocity     [N s/m]
-        Mat3 by_acceleration;             // by the corners' mean acceleration [N s2/m]
     };
 
     /// The gradient of a vector's product with the force, by the properties of the water.
     struct Gradient {
-        double fluid_density = 0.0, drag_coefficient = 0.0, thrust_coefficient = 0.0, added_mass = 0.0;
+        double fluid_density = 0.0, drag_coefficient = 0.0, thrust_coefficient = 0.0;
+        double normal_viscous_drag = 0.0, tangential_viscous_drag = 0.0;
         Vec3 velocity = Vec3::Zero();
 
         void add(const Gradient& other, double factor) {
             fluid_density += factor * other.fluid_density;
             drag_coefficient += factor * other.drag_coefficient;
             thrust_coefficient += factor * other.thrust_coefficient;
-            added_mass += factor * other.added_mass;
+            normal_viscous_drag += factor * other.normal_viscous_drag;
+            tangential_viscous_drag += factor * other.tangential_viscous_drag;
             velocity += factor * other.velocity;
         }
     };
 
-    Drag(const Water& water, const Corners& positions, const Corners& velocities,
-         const Corners& accelerations)
-        : water_(water), acceleration_(mean(accelerations)) {
-        for (int k = 0; k < 3; ++k) opposite_[k] = positions[(k + 2) % 3] - positions[(k + 1) % 3];
-        const Vec3 across = opposite_[0].cross(opposite_[1]);
-        area_ = 0.5 * across.norm();
-        normal_ = reciprocal(2.0 * area_) * across;
+    Drag(const Water& water, const MovingFace& face) : water_(water), face_(face) {
+        const Vec3& normal = face.normal;
+        speed_ = face.flow.norm();
+        direction_ = MovingFace::reciprocal(speed_) * face.flow;
 
-        const Vec3 flow = water.velocity - mean(velocities);
-        speed_ = flow.norm();
-        direction_ = reciprocal(speed_) * flow;
-
-        const double sine = normal_.dot(direction_);
+        const double sine = normal.dot(direction_);
         const double side = sine > 0.0 ? 1.0 : sine < 0.0 ? -1.0 : 0.0;
-        const Vec3 slip = normal_ - sine * direction_;
+        const Vec3 slip = normal - sine * direction_;
         const double cosine = slip.norm();
-        by_flow_ = reciprocal(cosine) * slip;
+        by_flow_ = MovingFace::reciprocal(cosine) * slip;
         by_normal_ = cosine * direction_ - sine * by_flow_;
 
         const AttackCurve::Sample drag = water.drag_curve.at(std::abs(sine), cosine);
@@ -131,53 +124,44 @@ class Drag {
 
     /// Returns f / 3.
     Vec3 corner_force() const {
-        const Vec3 carried = normal_.dot(acceleration_) * normal_;
-        const Vec3 pushed = drag().value * direction_ + thrust().value * normal_;
-        return (area_ / 3.0) * (pressure() * pushed - water_.added_mass * carried);
+        const Vec3 pushed = drag().value * direction_ + thrust().value * face_.normal;
+        return (face_.area / 3.0) * (pressure() * pushed + water_.tangential_viscous_drag * face_.flow +
+                                     (excess() * across()) * face_.normal);
     }
 
     Jacobian corner_jacobian() const {
         // With N = 2 A n: dA = n . dN / 2, A dn = (dN - n n . dN) / 2.
-        const double along = normal_.dot(acceleration_);
-        const Vec3 sideways = acceleration_ - along * normal_;
-        Mat3 by_across = pressure() * (drag().value * direction_ * normal_.transpose() +
-                                       turning() * by_normal_.transpose()) -
-                         water_.added_mass * normal_ * sideways.transpose();
-        by_across.diagonal().array() += pressure() * thrust().value - water_.added_mass * along;
+        const Vec3& n = face_.normal;
+        Mat3 by_across =
+            pressure() * (drag().value * direction_ * n.transpose() + turning() * by_normal_.transpose()) +
+            water_.tangential_viscous_drag * face_.flow * n.transpose() +
+            excess() * n * (face_.flow - across() * n).transpose();
+        by_across.diagonal().array() += pressure() * thrust().value + excess() * across();
         by_across /= 6.0;
 
         Jacobian jacobian;
-        for (int k = 0; k < 3; ++k) {  // dN = a_k x dx_k
-            const Vec3& a = opposite_[k];
-            Mat3& by_corner = jacobian.by_position[k];
-            by_corner.col(0) = by_across.col(1) * a.z() - by_across.col(2) * a.y();
-            by_corner.col(1) = by_across.col(2) * a.x() - by_across.col(0) * a.z();
-            by_corner.col(2) = by_across.col(0) * a.y() - by_across.col(1) * a.x();
-        }
+        for (int k = 0; k < 3; ++k) jacobian.by_position[k] = face_.by_corner(by_across, k);
         jacobian.by_velocity = by_flow() / -3.0;
-        jacobian.by_acceleration = (water_.added_mass * area_ / -3.0) * normal_ * normal_.transpose();
         return jacobian;
     }
 
     /// Returns the gradient of lambda . f. For three vectors on the corners, lambda is their mean.
     Gradient gradient(const Vec3& lambda) const {
-        const double along = normal_.dot(lambda);
-        const double by_drag = area_ * direction_.dot(lambda), by_thrust = area_ * along;
+        const double along = face_.normal.dot(lambda);
+        const double by_drag = face_.area * direction_.dot(lambda), by_thrust = face_.area * along;
         return {
             .fluid_density = 0.5 * speed_ * speed_ * (by_drag * drag().value + by_thrust * thrust().value),
             .drag_coefficient = pressure() * by_drag * drag_.value,
             .thrust_coefficient = pressure() * by_thrust * thrust_.value,
-            .added_mass = -area_ * normal_.dot(acceleration_) * along,
+            .normal_viscous_drag = by_thrust * across(),
+            .tangential_viscous_drag = face_.area * (lambda.dot(face_.flow) - along * across()),
             .velocity = by_flow().transpose() * lambda};
     }
 
   private:
-    /// Returns the mean; it is exact where all three are equal, so that no force acts on a face that moves with
-    /// the water.
-    static Vec3 mean(const Corners& c) { return c[0] + ((c[1] - c[0]) + (c[2] - c[0])) / 3.0; }
-
-    /// Returns 1 / x, or 0 where x is zero.
-    static double reciprocal(double x) { return x > std::numeric_limits<double>::min() ? 1.0 / x : 0.0; }
+    /// Returns n . u [m/s], and b_n - b_t [N s/m3].
+    double across() const { return face_.normal.dot(face_.flow); }
+    double excess() const { return water_.normal_viscous_drag - water_.tangential_viscous_drag; }
 
     /// Returns rho |u|^2 / 2 [Pa].
     double pressure() const { return 0.5 * water_.fluid_density * speed_ * speed_; }
@@ -191,21 +175,24 @@ class Drag {
     }
 
     /// Returns d(D d + T n) / dpsi at constant d and n.
-    Vec3 turning() const { return drag().slope * direction_ + thrust().slope * normal_; }
+    Vec3 turning() const { return drag().slope * direction_ + thrust().slope * face_.normal; }
 
     /// Returns df/du [N s/m].
     Mat3 by_flow() const {
-        Mat3 m = (drag().value * direction_ + 2.0 * thrust().value * normal_) * direction_.transpose() +
+        const Vec3& n = face_.normal;
+        Mat3 m = (drag().value * direction_ + 2.0 * thrust().value * n) * direction_.transpose() +
                  turning() * by_flow_.transpose();
         m.diagonal().array() += drag().value;
-        return (0.5 * water_.fluid_density * area_ * speed_) * m;
+        m *= 0.5 * water_.fluid_density * face_.area * speed_;
+        m += (excess() * face_.area) * n * n.transpose();
+        m.diagonal().array() += water_.tangential_viscous_drag * face_.area;
+        return m;
     }
 
     const Water& water_;
-    Vec3 acceleration_;                  // w
-    Corners opposite_;                   // a_k, the edge opposite corner k
-    double area_, speed_;                // A, |u|
-    Vec3 normal_, direction_;            // the face's own n, d
+    const MovingFace& face_;
+    double speed_;                       // |u|
+    Vec3 direction_;                     // d
     Vec3 by_flow_, by_normal_;           // e_u, e_n
     AttackCurve::Sample drag_, thrust_;  // of the curves alone, as functions of psi
 };

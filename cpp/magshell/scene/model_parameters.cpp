@@ -65,11 +65,23 @@ void ModelParameters::vjp(const VectorXd& q, const LoadParameters& load_paramete
 
 KinematicsGradient ModelParameters::forces_vjp(const Kinematics& at, const LoadParameters& load_parameters,
                                                const VectorXd& lambda, Gradient& out) const {
-    KinematicsGradient by{VectorXd::Zero(bodies_.nodes().n_dofs()), VectorXd::Zero(bodies_.nodes().n_dofs()),
-                          VectorXd::Zero(bodies_.nodes().n_dofs()), zero_load_parameters()};
+    const VectorXd nothing = VectorXd::Zero(bodies_.nodes().n_dofs());
+    KinematicsGradient by{nothing, nothing, zero_load_parameters()};
     for (const std::unique_ptr<ForceTerm>& force : terms_.forces)
         force->vjp(at, load_parameters, lambda, by, out);
+    if (at.momentum_rate.size() == 0) return by;
+    by.p_hat = at.rate * lambda;  // of the force (p^ - p)/tau
+    by.time = at.rate * lambda.dot(at.momentum_rate);
+    VectorXd by_q = nothing, by_v = nothing;
+    momentum_vjp(at.q, at.v, by.p_hat, by_q, by_v, out);
+    by.velocity -= by_v;
     return by;
+}
+
+void ModelParameters::momentum_vjp(const VectorXd& q, const VectorXd& v, const VectorXd& lambda,
+                                   VectorXd& by_q, VectorXd& by_v, Gradient& out) const {
+    for (const std::unique_ptr<ForceTerm>& force : terms_.forces)
+        force->momentum_vjp(q, v, lambda, by_q, by_v, out);
 }
 
 void ModelParameters::damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates,

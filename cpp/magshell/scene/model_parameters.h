@@ -63,6 +63,9 @@ class ModelParameters {
     /// Adds - lambda . df/dk of the forces f to the gradient; returns the gradient of lambda . f by the kinematics.
     KinematicsGradient forces_vjp(const Kinematics& at, const LoadParameters& load_parameters,
                                   const VectorXd& lambda, Gradient& out) const;
+    /// Adds the gradient of lambda . p of the momentum p(q, v) that forces carry.
+    void momentum_vjp(const VectorXd& q, const VectorXd& v, const VectorXd& lambda, VectorXd& by_q,
+                      VectorXd& by_v, Gradient& out) const;
     /// Adds the gradient of a function of the strain rates of joint dampers at q for velocities v.
     void damper_rates_vjp(const VectorXd& q, const VectorXd& v, const StrainSet& by_rates, VectorXd& by_q,
                           VectorXd& by_v, Gradient& out) const;

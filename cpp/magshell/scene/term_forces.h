@@ -23,6 +23,13 @@ class TermForces {
         return name == "contact" || name == "body contact" || name == "friction" || name == "body friction";
     }
 
+    /// Returns the first force that may carry momentum, for what all of them carry; -1 without one.
+    Index carrier() const {
+        for (Index k = energies_; k < rows_; ++k)
+            if (model_.terms().forces[k - energies_]->may_carry_momentum()) return k;
+        return -1;
+    }
+
     /// Returns 1 for each node of a rigid part, 0 for the others.
     std::vector<char> nodes_of_rigid_parts() const {
         std::vector<char> found(model_.nodes().n_nodes(), 0);

@@ -185,7 +185,7 @@ def swimmer(render_mode: str | None = None, disturbed: bool = True) -> Environme
         mass_density=1.5e3,
         remanent_magnetization=-4e4 * in_head[:, None] * np.array([1.0, 0.0, 0.0]),
     )
-    water = Water(thrust_coefficient=0.0)
+    water = Water(drag_coefficient=1.0, thrust_coefficient=0.0)  # 2 sin^2 along the flow
     scene = Scene(sheet, water=water, field=UniformField(), allow_rigid_motions=True)
     return _moving_strip(scene, length, strongest, 5e-3, 4, _ahead, render_mode, disturbed)
 

@@ -290,8 +290,7 @@ class ProjectiveDynamics:
 class ImplicitEuler:
     """Takes one solve a step and has first order, as in [Chen22] (26)-(28).
 
-    It damps: the energy of a vibration of 40 steps a period falls to a share of 1/e in about 6.5 steps. It is the default
-    of motions with contact in water with added mass.
+    It damps: the energy of a vibration of 40 steps a period falls to a share of 1/e in about 6.5 steps.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -319,7 +318,7 @@ class TRBDF2:
         Newmark's method in C. Kane et al., Int. J. Numer. Methods Eng. 49 (2000). False: they act at the stages like
         all other forces, and after an impact shorter than a step the speed may have any value. True: such an impact
         loses energy, one of 20 steps rebounds with 0.93 to 0.95 of its speed, one of 100 steps with 0.97 to 0.98. The
-        method then has first order in contact and second order without. Water with added mass is refused.
+        method then has first order in contact and second order without.
         ms.simulate takes True where a scene has contacts and no integrator is given.
 
     >>> import magshell as ms

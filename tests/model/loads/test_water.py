@@ -15,7 +15,12 @@ KINKED = {"attack_table": (UNEVEN, 0.05 + UNEVEN), "thrust_table": (UNEVEN, 0.1 
 
 
 def make(tables):
-    numbers = {"drag_coefficient": 0.7, "thrust_coefficient": 1.3, "added_mass": 2.5}
+    numbers = {
+        "drag_coefficient": 0.7,
+        "thrust_coefficient": 1.3,
+        "added_mass": 2.5,
+        "tangential_viscous_drag": 3.0,
+    }
     return ms.Water(velocity=(0.3, -0.2, 0.4), **numbers, **tables)
 
 
@@ -34,12 +39,17 @@ def make(tables):
     ],
 )
 def test_is_smooth_follows_from_the_tables(smooth, tables):
-    assert ms.Water(**tables).is_smooth is smooth
+    assert ms.Water(**{"drag_coefficient": 1, **tables}).is_smooth is smooth
 
 
 def test_tables_go_through_their_values_twice_differentiably(rng):
     values, slopes = rng.uniform(0, 2, len(UNEVEN)), (0.3, -0.7)
-    water = ms.Water(attack_table=(UNEVEN, values, slopes), thrust_table=(UNEVEN, values))
+    water = ms.Water(
+        drag_coefficient=1,
+        thrust_coefficient=1,
+        attack_table=(UNEVEN, values, slopes),
+        thrust_table=(UNEVEN, values),
+    )
     for curve in water.coefficients(UNEVEN):
         np.testing.assert_allclose(curve, values, rtol=0, atol=1e-14)
     ends = water._drag_curve.samples(UNEVEN[[0, -1]])[:, 1]
@@ -56,6 +66,8 @@ def test_tables_go_through_their_values_twice_differentiably(rng):
         ({"fluid_density": -1}, r"fluid_density \[kg/m3\] must not be negative, got -1"),
         ({"drag_coefficient": -0.5}, r"drag_coefficient \[1\] must not be negative, got -0.5"),
         ({"thrust_coefficient": -0.5}, r"thrust_coefficient \[1\] must not be negative"),
+        ({"normal_viscous_drag": -2}, r"normal_viscous_drag \[N s/m3\] must not be negative, got -2"),
+        ({"tangential_viscous_drag": np.inf}, r"tangential_viscous_drag \[N s/m3\] must be finite"),
         ({"added_mass": -2}, r"added_mass \[kg/m2\] must not be negative"),
         ({"fluid_density": np.nan}, r"fluid_density \[kg/m3\] must be finite"),
         ({"drag_coefficient": [1, 2]}, r"drag_coefficient \[1\] must be a number, got shape \(2,\)"),
@@ -112,5 +124,5 @@ def test_replaced_keeps_the_rest():
     assert denser.attack_table is not None and denser.added_mass == water.added_mass
     assert repr(denser) == (
         "Water(1025 kg/m3, velocity (0.3, -0.2, 0.4) m/s, drag_coefficient 0.7, thrust_coefficient 1.3, "
-        "attack_table of 6 angles, thrust_table of 6 angles, added_mass 2.5 kg/m2)"
+        "attack_table of 6 angles, thrust_table of 6 angles, added_mass 2.5 kg/m2, tangential_viscous_drag 3 N s/m3)"
     )

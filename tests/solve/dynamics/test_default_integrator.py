@@ -39,15 +39,10 @@ def ball_on_a_pendulum():
     return scene, hinge, touch
 
 
-def test_default_integrator_depends_on_contacts_and_added_mass():
-    free, wet = sheet_above_a_floor(contacts=()), sheet_above_a_floor(water=ms.Water())
-    heavy = sheet_above_a_floor(water=ms.Water(added_mass=0.5))
+def test_default_integrator_depends_on_contacts():
+    free, heavy = sheet_above_a_floor(contacts=()), sheet_above_a_floor(water=ms.Water(added_mass=0.5))
     assert thrown(free).integrator == ms.TRBDF2()
-    assert thrown(sheet_above_a_floor()).integrator == thrown(wet).integrator == IMPLICIT
-    assert thrown(heavy).integrator == ms.ImplicitEuler()
-    # The added mass of the motion counts, not that of the scene.
-    assert thrown(wet, values={wet.water: {"added_mass": 0.5}}).integrator == ms.ImplicitEuler()
-    assert thrown(heavy, values={heavy.water: {"added_mass": 0.0}}).integrator == IMPLICIT
+    assert thrown(sheet_above_a_floor()).integrator == thrown(heavy).integrator == IMPLICIT
     assert thrown(heavy, integrator=ms.TRBDF2()).integrator == ms.TRBDF2()
 
 

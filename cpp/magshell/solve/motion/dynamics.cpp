@@ -21,7 +21,8 @@ std::size_t bytes_of(const MotionState& state) {
     for (const StrainSet& strains : state.e) bytes += strains.bytes();
     for (const StrainSet& rates : state.rates.elastic.e) bytes += rates.bytes();
     return bytes + sizeof(double) * (state.q.size() + state.v.size() + state.rates.v.size() +
-                                     state.rates.acceleration.size() + state.rates.c.size());
+                                     state.rates.acceleration.size() + state.rates.c.size() +
+                                     state.rates.momentum_rate.size());
 }
 
 std::size_t bytes_of(const SubstepRecord& substep) {
@@ -35,12 +36,14 @@ std::size_t bytes_of(const SubstepRecord& substep) {
     return bytes;
 }
 
-// Appends the last state to the recorded ones; its energies are filled in later.
+// Appends the last state to the recorded ones, with the kinetic energy for the present parameters; its other energies are
+// filled in later.
 void record_state(const Model& model, const MotionInput& input, MotionResult& result) {
     const MotionState& state = result.last;
     result.recorded.push_back(
         {state.q, state.v, state.angle_branches, {}, {}, state.motor_forces, state.held});
-    result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)));
+    result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)) +
+                                    model.carried_energy(state.q, state.v));
     result.energies.emplace_back(model.term_names().size(), std::numeric_limits<double>::quiet_NaN());
 }
 
@@ -175,7 +178,9 @@ class Run {
         const std::size_t vector = sizeof(double) * model_.size();
         const std::size_t strains = sizeof(double) * model_.elastic().size();
         const bool implicit_contact = input_.tableau.implicit_contact;
-        std::size_t state = ((explicit_first ? 4 : 2) + (implicit_contact ? 1 : 0)) * vector;
+        const bool carries = explicit_first && model_.may_carry_momentum();
+        std::size_t state =
+            ((explicit_first ? 4 : 2) + (implicit_contact ? 1 : 0) + (carries ? 1 : 0)) * vector;
         const std::size_t branches = input_.viscosity.branches.size();
         state += branches * strains;
         if (explicit_first && input_.viscosity.any()) state += (1 + branches) * strains;
@@ -298,13 +303,13 @@ class Run {
     }
 
     void record() {
-        record_state(model_, input_, result_);
         const Index done = result_.steps_done;
         const LoadParameters now =
             done == 0 ? input_.load_parameters_at(0, 0.0) : input_.load_parameters_at(done - 1, 1.0);
         const MotionState& state = result_.last;
         model_.set_angle_branches(state.angle_branches);
         model_.parameters().set_time_varying(now);
+        record_state(model_, input_, result_);
         std::vector<double>& of_terms = result_.energies.back();
         std::size_t term = 0;
         for (const auto& [name, energy] : model_.energies(state.q, now)) of_terms[term++] = energy;

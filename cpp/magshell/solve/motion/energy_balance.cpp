@@ -32,6 +32,11 @@ EnergyBalance::StateEnergy EnergyBalance::state_energy(const MotionState& state,
             model_.contacts().energy(state.q, load_parameters)};
 }
 
+double EnergyBalance::kinetic(const MotionState& state, const LoadParameters& load_parameters) {
+    model_.parameters().set_time_varying(load_parameters);
+    return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)) + model_.carried_energy(state.q, state.v);
+}
+
 bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& record,
                                 std::span<const LoadParameters> load_parameters) const {
     const Contacts& contact = model_.contacts();
@@ -48,9 +53,9 @@ bool EnergyBalance::gains_energy(const StepAlgebra& step, const SubstepRecord& r
     const StateEnergy at_first = state_energy(begin, first);
     end_ = state_energy(end, last);
     const double at_begin = at_first.energy, at_end = end_.energy;
-    const double moving = kinetic(begin), kept = at_first.of_contact;
+    const double moving = kinetic(begin, first), kept = at_first.of_contact;
     const double tolerated = tolerated_gain * (moving + kept);
-    const double gain = at_end + kinetic(end) - at_begin - moving - tolerated -
+    const double gain = at_end + kinetic(end, last) - at_begin - moving - tolerated -
                         balance_round_off * (std::abs(at_begin) + std::abs(at_end));
     if (!(gain > 0.0)) return false;
     if (euler_ && !model_.capabilities().has_barrier && !(gain_by_contact(at_first, end, last) > tolerated))
@@ -77,7 +82,7 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
                            std::span<const LoadParameters> load_parameters) {
     const Tableau& tableau = step.tableau();
     const int first = tableau.begins_explicitly ? 1 : 0;
-    const StepRates at(model_, step, free_bodies_, record);
+    const StepRates at(model_, step, free_bodies_, record, load_parameters);
     const ScopedContactFactor usual_contact_afterwards(model_);
     if (tableau.implicit_contact) model_.contacts().set_factor(0.0);
     double sum = 0.0;
@@ -90,8 +95,13 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
         model_.parameters().set_time_varying(now);
         model_.evaluate(q, now);
         const StageRates& rates = at.all[j];
-        sum += tableau.a[tableau.stages - 1][j] *
-               rates.v.dot(mass_.cwiseProduct(rates.acceleration) + model_.residual().gradient);
+        VectorXd forces = mass_.cwiseProduct(rates.acceleration) + model_.residual().gradient;
+        if (rates.momentum_rate.size() > 0) {
+            VectorXd of_water = VectorXd::Zero(q.size());
+            model_.carried_energy(q, rates.v, &of_water);
+            forces += rates.momentum_rate - of_water;
+        }
+        sum += tableau.a[tableau.stages - 1][j] * rates.v.dot(forces);
     }
     if (tableau.implicit_contact) {
         const StageRates& last = at.all.back();

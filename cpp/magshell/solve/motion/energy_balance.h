@@ -7,7 +7,8 @@
 //   W = dt sum_j b_j v_j . (M w_j + dE/dx_j)  +  change of the energy with the load parameters
 //
 // with the weights b_j of the last stage, and velocities v_j and accelerations w_j of the stages (StageRates). M w_j +
-// dE/dx_j is the force that is not the gradient of the energy: of supports, friction, drag and viscosity. Where contact is
+// dE/dx_j is the force that is not the gradient of the energy: of supports, friction, drag and viscosity. Carried momentum p of
+// water is added to M v: its rate minus dT/dx to M w, and v . p - T to the kinetic energy (ForceTerm). Where contact is
 // implicit (tableau.h), w and E of the sum are without contact, and dt (v_begin + v_end)/2 . (M C + dE_C/dx) is added: the
 // acceleration C by contact and friction acts at the mean velocity, E_C is the energy of contact. With follower loads the
 // test does not apply: it could not distinguish their work from a gain.
@@ -44,7 +45,7 @@ class EnergyBalance {
 
   private:
     bool prevented() const { return model_.capabilities().has_unsymmetric_tangent; }
-    double kinetic(const MotionState& state) const { return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)); }
+    double kinetic(const MotionState& state, const LoadParameters& load_parameters);
     double energy(const VectorXd& q, const Model::AngleBranches& angle_branches,
                   const LoadParameters& load_parameters);
     /// A state with its load parameters and its potential energies.

@@ -66,7 +66,7 @@ class Accountant {
         const VectorXd& q;
         const Model::AngleBranches& angle_branches;
         const LoadParameters& load_parameters;
-        const VectorXd &v, &acceleration;
+        const VectorXd &v, &acceleration, &momentum_rate;
         StageMotion motion;
     };
 
@@ -93,9 +93,12 @@ class Accountant {
     // Evaluates implicit contact at the end of a step.
     Rates contact_rates(const Instant& at, const VectorXd& mean_velocity, const VectorXd& by_contact);
     void add_viscous(const Instant& at, const StrainRates& elastic, const StrainRates& joints, Rates& to);
+    // Adds what follows from the momentum that a force carries, which counts as the scene's: the force leaves its energy as
+    // it is, and at a node it has the moment of v x p besides that of its rate.
+    void add_carried(const Instant& at, Rates& to);
     // Adds the work of parameters that change by `change` on the energies, without or with only implicit contact, and that of
     // the motors and directions that follow them.
-    void add_driven(const VectorXd& q, const Model::AngleBranches& angle_branches,
+    void add_driven(const VectorXd& q, const VectorXd& v, const Model::AngleBranches& angle_branches,
                     const LoadParameters& load_parameters, const LoadParameters& change,
                     const VectorXd& reactions, bool contact, bool others);
     // Adds the strain rates of one kind to those of a step.
@@ -238,6 +241,19 @@ void Accountant::add_viscous(const Instant& at, const StrainRates& elastic, cons
     }
 }
 
+void Accountant::add_carried(const Instant& at, Rates& to) {
+    if (at.momentum_rate.size() == 0) return;
+    to.reactions += at.momentum_rate;
+    const VectorXd momentum = model_.carried_momentum(at.q, at.v);
+    VectorXd by_q = VectorXd::Zero(at.q.size());
+    model_.carried_energy(at.q, at.v, &by_q);
+    const Index row = terms_.carrier();
+    to.forces(row, 0) -= by_q.dot(at.v);
+    for (Index node = 0; node < model_.nodes().n_vertices(); ++node)
+        to.forces.row(row).tail<3>() += Eigen::Vector3d(at.v.segment<3>(3 * node))
+                                            .cross(Eigen::Vector3d(momentum.segment<3>(3 * node)));
+}
+
 Accountant::Rates Accountant::rates(const Instant& at, bool implicit_contact, const StrainRates& elastic,
                                     const StrainRates& joints) {
     const VectorXd inertial = input_.inertia.mass.cwiseProduct(at.acceleration);
@@ -250,6 +266,7 @@ Accountant::Rates Accountant::rates(const Instant& at, bool implicit_contact, co
         add_force(-gradient, at.q, at.v, row, found.forces);
         found.reactions += gradient;
     });
+    add_carried(at, found);
     add_viscous(at, elastic, joints, found);
     add_reactions(found.reactions, inertial, at.q, at.v, found.forces);
     return found;
@@ -268,7 +285,7 @@ Accountant::Rates Accountant::contact_rates(const Instant& at, const VectorXd& m
     return found;
 }
 
-void Accountant::add_driven(const VectorXd& q, const Model::AngleBranches& angle_branches,
+void Accountant::add_driven(const VectorXd& q, const VectorXd& v, const Model::AngleBranches& angle_branches,
                             const LoadParameters& load_parameters, const LoadParameters& change,
                             const VectorXd& reactions, bool contact, bool others) {
     if (change.isZero(0.0)) return;
@@ -280,6 +297,14 @@ void Accountant::add_driven(const VectorXd& q, const Model::AngleBranches& angle
                                   [&](Index row) { return terms_.is_contact(row) ? contact : others; });
     };
     driven_ += (energies(difference) - energies(-difference)) / (2.0 * difference);
+    if (others && model_.may_carry_momentum()) {
+        // The carried energy v . p - T changes at fixed q and p by - dT.
+        const auto kinetic = [&](double factor) {
+            model_.parameters().set_time_varying(load_parameters + factor * change);
+            return v.dot(model_.carried_momentum(q, v)) - model_.carried_energy(q, v);
+        };
+        sums_(terms_.carrier(), 0) -= (kinetic(difference) - kinetic(-difference)) / (2.0 * difference);
+    }
     model_.parameters().set_time_varying(load_parameters);
     if (!model_.dof_map().has_prescribed_motion()) return;
     model_.linearize(q);
@@ -321,7 +346,7 @@ void Accountant::add(const StepAlgebra& step, const SubstepRecord& record, const
     const Tableau& tableau = step.tableau();
     const int first = tableau.begins_explicitly ? 1 : 0, n = tableau.stages;
     const MotionState& begin = record.begin;
-    StepRates at(model_, step, stepper_.free_bodies(), record);
+    StepRates at(model_, step, stepper_.free_bodies(), record, load_parameters);
     if (input_.viscosity.any())
         add_strain_rates(step, record, load_parameters, input_.viscosity, model_.elastic(),
                          &StageRates::elastic, begin.e, at.all);
@@ -352,12 +377,13 @@ void Accountant::add(const StepAlgebra& step, const SubstepRecord& record, const
         if (!is_known) {
             const double T = step.stage_time();
             const VectorXd x_hat = begins ? VectorXd(q - T * v) : at.x_hat[point - 1],
-                           v_hat = begins ? VectorXd(v - T * acceleration) : at.v_hat[point - 1];
-            last_ = rates({q, branches, load_parameters[point], v, acceleration, {&x_hat, &v_hat, T}},
+                           p_hat = begins ? VectorXd(VectorXd::Zero(q.size())) : at.p_hat[point - 1];
+            last_ = rates({q, branches, load_parameters[point], v, acceleration, at.all[j].momentum_rate,
+                           {&x_hat, &p_hat, T}},
                           tableau.implicit_contact, at.all[j].elastic, at.all[j].joints);
         }
         sums_ += (step.dt() * weight) * last_.forces;
-        add_driven(q, branches, load_parameters[point], weight * change_at(point), last_.reactions,
+        add_driven(q, v, branches, load_parameters[point], weight * change_at(point), last_.reactions,
                    !tableau.implicit_contact, true);
     }
     if (tableau.implicit_contact) {
@@ -369,10 +395,11 @@ void Accountant::add(const StepAlgebra& step, const SubstepRecord& record, const
                                            load_parameters.back(),
                                            at.all.back().v,
                                            at.all.back().acceleration,
-                                           {&at.x_hat.back(), &at.v_hat.back(), T}},
+                                           at.all.back().momentum_rate,
+                                           {&at.x_hat.back(), &at.p_hat.back(), T}},
                                           mean, stage.contact);
         sums_ += step.dt() * found.forces;
-        add_driven(stage.q, stage.angle_branches, load_parameters.back(),
+        add_driven(stage.q, mean, stage.angle_branches, load_parameters.back(),
                    load_parameters.back() - load_parameters.front(), found.reactions, true, false);
     }
     model_.linearize(end.q);
@@ -399,8 +426,9 @@ MotionBalance::State Accountant::state(const MotionState& at, const LoadParamete
                                     model_.elastic().stresses(stretched).dot(stretched);
         }
     }
-    const VectorXd momentum = input_.inertia.mass.cwiseProduct(at.v);
-    found.kinetic = 0.5 * at.v.dot(momentum);
+    VectorXd momentum = input_.inertia.mass.cwiseProduct(at.v);
+    found.kinetic = 0.5 * at.v.dot(momentum) + model_.carried_energy(at.q, at.v);
+    if (model_.may_carry_momentum()) momentum += model_.carried_momentum(at.q, at.v);
     for (Index node = 0; node < model_.nodes().n_vertices(); ++node) {
         const Eigen::Vector3d of_node = momentum.segment<3>(3 * node), place = at.q.segment<3>(3 * node);
         found.momenta.head<3>() += of_node;

@@ -27,6 +27,14 @@ void StepAlgebra::start_of_stage(int i, const MotionState& begin, const std::vec
     }
 }
 
+VectorXd StepAlgebra::start_of_momentum(int i, const VectorXd& momentum,
+                                        const std::vector<StageRates>& rates) const {
+    VectorXd p_hat = momentum;
+    for (std::size_t j = 0; j < rates.size(); ++j)
+        if (p_hat.size() > 0) p_hat += (dt_ * tableau_.a[i][j]) * rates[j].momentum_rate;
+    return p_hat;
+}
+
 void StepAlgebra::finish_stage(int i, const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat,
                                Index coordinates, StageRates& rates) const {
     rates.v = VectorXd::Zero(q.size());
@@ -99,7 +107,8 @@ NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadPar
 
 const Tableau& Stepper::tableau_from(const MotionState& state, bool dissipative) const {
     if (dissipative) return dissipative_;
-    const bool known = !state.rates.empty() && (!tableau_.implicit_contact || state.rates.c.size() > 0);
+    const bool known = !state.rates.empty() && (!tableau_.implicit_contact || state.rates.c.size() > 0) &&
+                       (state.rates.momentum_rate.size() > 0 || !newton_.model().may_carry_momentum());
     return tableau_.begins_explicitly && !known ? starter_ : tableau_;
 }
 
@@ -118,19 +127,32 @@ std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, 
     return rates;
 }
 
-StepRates::StepRates(const Model& model, const StepAlgebra& step, const std::vector<FreeBody>& free_bodies,
-                     const SubstepRecord& substep)
+StepRates::StepRates(Model& model, const StepAlgebra& step, const std::vector<FreeBody>& free_bodies,
+                     const SubstepRecord& substep, std::span<const LoadParameters> load_parameters)
     : flight(free_bodies, step.tableau(), step.dt(), substep.begin.q, substep.begin.v),
       x_hat(substep.stages.size()),
       v_hat(substep.stages.size()),
+      p_hat(substep.stages.size()),
       all(first_rates(model, step.tableau(), substep.begin)) {
+    const bool carries = model.may_carry_momentum();
+    VectorXd momentum;
+    if (carries) {
+        model.parameters().set_time_varying(load_parameters.front());
+        momentum = model.carried_momentum(substep.begin.q, substep.begin.v);
+    }
     for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
+        const VectorXd& q = substep.stages[i].q;
         step.start_of_stage(i, substep.begin, all, x_hat[i], v_hat[i]);
         flight.add_defect(i, x_hat[i], v_hat[i]);
+        p_hat[i] = step.start_of_momentum(i, momentum, all);
         StageRates& now = all.emplace_back();
         now.c = substep.stages[i].contact;
-        step.finish_stage(i, substep.stages[i].q, x_hat[i], v_hat[i], model.n_coordinates(), now);
+        step.finish_stage(i, q, x_hat[i], v_hat[i], model.n_coordinates(), now);
+        if (!carries) continue;
+        model.parameters().set_time_varying(load_parameters[i + 1]);
+        now.momentum_rate = (model.carried_momentum(q, now.v) - p_hat[i]) / step.stage_time();
     }
+    if (carries) model.parameters().set_time_varying(load_parameters.front());
 }
 
 // The stages of a step have the same inertia and nearly the same stiffness. So a factorization that served a whole stage serves the next one
@@ -150,6 +172,9 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = model.n_coordinates();
+    const bool carries = model.may_carry_momentum();
+    if (carries) model.parameters().set_time_varying(load_parameters.front());
+    const VectorXd momentum = model.carried_momentum(state.q, state.v);
     model.set_angle_branches(state.angle_branches);
     model.begin_step(state.q, load_parameters.front());
     const ScopedStrainHistory elastic_afterwards(model);
@@ -170,6 +195,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     for (int i = 0; i < tableau.stages; ++i) {
         step.start_of_stage(i, state, rates, x_hat, v_hat);
         flight.add_defect(i, x_hat, v_hat);
+        const VectorXd p_hat = step.start_of_momentum(i, momentum, rates);
         const double contact_factor = tableau.contact_factor(i);
         model.contacts().set_factor(contact_factor);
         model.parameters().set_time_varying(load_parameters[i + 1]);
@@ -213,7 +239,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
                                   joints_at_begin, {});
             model.dampers().set_history(damper_law.scale(T), &joints.shift);
         }
-        const StageMotion motion{&x_hat, &v_hat, step.stage_time()};
+        const StageMotion motion{&x_hat, &p_hat, step.stage_time()};
         const ProximalTerm proximal{&step.weights(), &target, &motion};
         const bool reused =
             i > 0 && serves_again(report, factorizations, in_contact, q, load_parameters[i + 1]);
@@ -242,6 +268,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
             held = model.dof_map().along_supports(held);
         }
         step.finish_stage(i, q, x_hat, v_hat, coordinates, now);
+        if (carries) now.momentum_rate = (model.carried_momentum(q, now.v) - p_hat) / step.stage_time();
         if (i + 1 == tableau.stages && model.dof_map().has_motors())
             motor_forces = MotorReactions(newton_, inertia_, state, step, q, load_parameters[i + 1], proximal,
                                           v_hat, now)

@@ -4,6 +4,9 @@
 //                                                                          + Gamma x^_i/(a dt)
 //
 // where x^_i and v^_i are the contributions of the start of the step and of the stages before it.       [Chen22] (26)-(28)
+// Momentum p(x, v) that forces carry beside M v, as water does, goes the same way (ForceTerm):
+//
+//   p^_i = p + dt sum_j a_ij r_j,   r_i = (p(x_i, v_i) - p^_i)/(a dt),   M w_i + r_i + g(x_i) = 0
 #pragma once
 
 #include <span>
@@ -56,6 +59,8 @@ class StepAlgebra {
     /// Computes x^ and v^ of stage i from all rates before it.
     void start_of_stage(int i, const MotionState& begin, const std::vector<StageRates>& rates,
                         VectorXd& x_hat, VectorXd& v_hat) const;
+    /// Returns p^ of stage i from the carried momentum at the beginning of the step; empty if that is.
+    VectorXd start_of_momentum(int i, const VectorXd& momentum, const std::vector<StageRates>& rates) const;
     /// Computes v and w of stage i from its solution and rates.c.
     void finish_stage(int i, const VectorXd& q, const VectorXd& x_hat, const VectorXd& v_hat,
                       Index coordinates, StageRates& rates) const;
@@ -135,11 +140,12 @@ std::vector<StageRates> first_rates(const Model& model, const Tableau& tableau, 
 /// The rates of a step, recomputed from its stored states: those it began with, and those of its stages.
 struct StepRates {
     FreeFlight flight;
-    std::vector<VectorXd> x_hat, v_hat;
+    std::vector<VectorXd> x_hat, v_hat, p_hat;
     std::vector<StageRates> all;
 
-    StepRates(const Model& model, const StepAlgebra& step, const std::vector<FreeBody>& free_bodies,
-              const SubstepRecord& substep);
+    /// load_parameters: those at the beginning of the step, which the model has again afterwards, and at its stages.
+    StepRates(Model& model, const StepAlgebra& step, const std::vector<FreeBody>& free_bodies,
+              const SubstepRecord& substep, std::span<const LoadParameters> load_parameters);
 };
 
 }  // namespace magshell

@@ -49,9 +49,10 @@ struct StrainRates {
 };
 
 /// Rates at a stage: of positions, velocities, elastic strains, and strains of joint dampers. If contact is implicit (tableau.h), the
-/// acceleration is that without contact, and c that by contact and friction; else c is empty.
+/// acceleration is that without contact, and c that by contact and friction; else c is empty. momentum_rate: of the momentum that
+/// forces carry [N]; empty without it.
 struct StageRates {
-    VectorXd v, acceleration, c = {};
+    VectorXd v, acceleration, c = {}, momentum_rate = {};
     StrainRates elastic, joints;
 
     bool empty() const { return v.size() == 0; }

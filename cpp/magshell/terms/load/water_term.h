@@ -1,9 +1,10 @@
-// WaterTerm: drag, thrust and added mass of surrounding water on all faces of a shell.
-// force/drag.h
+// WaterTerm: drag, thrust, viscous drag and added mass of surrounding water on all faces of a body.
+// force/drag.h, force/added_mass.h
 #pragma once
 
 #include "magshell/assembly/element_loop.h"
 #include "magshell/body/surface.h"
+#include "magshell/force/added_mass.h"
 #include "magshell/force/drag.h"
 #include "magshell/terms/force_term.h"
 
@@ -22,13 +23,22 @@ class WaterTerm final : public ForceTerm {
                   SystemMatrix& out, NonsymmetricTangent& rest) const override;
     void vjp(const Kinematics& at, const LoadParameters& load_parameters, const VectorXd& lambda,
              KinematicsGradient& by, Gradient& out) const override;
+    void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
+
+    bool may_carry_momentum() const override { return true; }
+    void add_momentum(const VectorXd& q, const VectorXd& v, VectorXd& out) const override;
+    void momentum_vjp(const VectorXd& q, const VectorXd& v, const VectorXd& lambda, VectorXd& by_q,
+                      VectorXd& by_v, Gradient& out) const override;
+    double carried_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q) const override;
 
   private:
-    Drag drag(const Kinematics& at, Index face) const;
+    bool carries_momentum() const { return water_.added_mass > 0.0; }
+    MovingFace moving_face(const VectorXd& q, const VectorXd& v, Index face) const;
 
     const Surface& surface_;
     const FaceLoop& loop_;
-    ParameterSlice fluid_density_, velocity_, drag_coefficient_, thrust_coefficient_, added_mass_;
+    ParameterSlice fluid_density_, velocity_, drag_coefficient_, thrust_coefficient_, added_mass_,
+        normal_viscous_drag_, tangential_viscous_drag_;
     Water water_;
 };
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..._input.tensors import detached
 from ...model.contact.obstacles import Attached
 from ..options import TRBDF2, ImplicitEuler, Integrator
 
@@ -15,12 +14,9 @@ if TYPE_CHECKING:
 def default_integrator(inputs: Inputs) -> Integrator:
     """Return the integrator of a motion for which none is given.
 
-    It is TRBDF2(). If the scene has contacts, contact is implicit in it; with added mass of water too, which contact forces
-    would have to accelerate as well, it is ImplicitEuler().
+    It is TRBDF2(); if the scene has contacts, contact is implicit in it.
     """
-    if not inputs.scene.contacts:
-        return TRBDF2()
-    return ImplicitEuler() if _added_mass(inputs) > 0.0 else TRBDF2(implicit_contact=True)
+    return TRBDF2(implicit_contact=True) if inputs.scene.contacts else TRBDF2()
 
 
 def integrator_of_actions() -> Integrator:
@@ -40,16 +36,3 @@ def check_contact_method(inputs: Inputs, integrator: Integrator) -> None:
         raise ValueError(
             f"ms.ProjectiveDynamics does not take an obstacle that a body carries: {attached[0]!r:.80}"
         )
-    if not getattr(integrator, "implicit_contact", False) or not scene.contacts:
-        return
-    added_mass = _added_mass(inputs)
-    if added_mass > 0.0:
-        raise ValueError(
-            "TRBDF2(implicit_contact=True) needs water without added mass, which contact forces would accelerate as "
-            f"well; the water has added_mass = {added_mass:g} kg/m2. Take TRBDF2() or ImplicitEuler()"
-        )
-
-
-def _added_mass(inputs: Inputs) -> float:
-    water = inputs.scene.water
-    return 0.0 if water is None else float(detached(inputs.values.current(water).added_mass))

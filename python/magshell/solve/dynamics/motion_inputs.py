@@ -323,6 +323,7 @@ class MotionInputs:
             "maxwell_strains": start.maxwell_strains if maxwell else nothing,
             "acceleration": start.acceleration if known else nothing,
             "contact_acceleration": start.contact_acceleration,
+            "momentum_rate": start.momentum_rate,
             "strain_rates": start.strain_rates,
             "maxwell_strain_rates": start.maxwell_strain_rates if maxwell else nothing,
         }
@@ -449,7 +450,7 @@ def _checked_state(start: MotionState, size: int, n_strains: int) -> MotionState
         raise ValueError(
             f"start is a state of {len(start.state)} degrees of freedom, but the scene has {size}"
         )
-    rates = ("acceleration", "contact_acceleration")
+    rates = ("acceleration", "contact_acceleration", "momentum_rate")
     for name in ("state", "velocity", *rates):
         values = getattr(start, name)
         optional = name in rates and np.shape(values) == (0,)

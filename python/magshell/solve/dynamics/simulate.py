@@ -136,8 +136,8 @@ def simulate(
         sources may be given per step, (steps, ...), and then jump. For friction, the velocity of an obstacle at the end
         of a step is that of a parabola through three neighbouring ends, interpolated linearly between them.
     integrator: TRBDF2() by default; TRBDF2(implicit_contact=True) if the scene has contacts, with which bodies rebound
-        correctly where the steps resolve the impact and lose energy where they do not; ImplicitEuler() if it has contacts
-        and water with added mass, which implicit contact does not support. Others: SDIRK2(), SDIRK3(), ProjectiveDynamics().
+        correctly where the steps resolve the impact and lose energy where they do not. Others: ImplicitEuler(), SDIRK2(),
+        SDIRK3(), ProjectiveDynamics().
     record_every: the number of steps (or intervals) between recorded states. The start is recorded too.
     adjoint_storage: what is stored for gradients: "stages" (all states), "checkpoints", "factors", or an ms.AdjointStorage,
         which also limits the bytes. By default all states if they fit into 2 GB, else checkpoints.

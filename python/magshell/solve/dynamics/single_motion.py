@@ -377,6 +377,7 @@ def _trajectory(motion_inputs: MotionInputs, found, wall_time: float, known=None
             found.begun or motion_inputs.start.rotations_known,
             found.last_contact_acceleration,
             fine_faces(values),
+            found.last_momentum_rate,
         ),
         iterations=found.iterations,
         factorizations=found.factorizations,

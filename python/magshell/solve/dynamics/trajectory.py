@@ -55,8 +55,9 @@ class MotionState:
     branch, one after another.
     Arrays that the motion did not need are empty: accelerations and strain rates are those of TRBDF2, Maxwell strains those
     of Maxwell branches. contact_acceleration: the share of contact and friction, which `acceleration` does not contain; only
-    with TRBDF2(implicit_contact=True). fine_faces: 1 for each magnetized face that evaluates the applied field at several
-    points, else 0; if it is empty, the next motion chooses these faces.
+    with TRBDF2(implicit_contact=True). momentum_rate: N, of the added mass of water; only with TRBDF2 in water.
+    fine_faces: 1 for each magnetized face that evaluates the applied field at several points, else 0; if it is empty, the
+    next motion chooses these faces.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -79,6 +80,7 @@ class MotionState:
     rotations_known: bool = field(repr=False, default=True)
     contact_acceleration: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
     fine_faces: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
+    momentum_rate: np.ndarray = field(repr=False, default_factory=lambda: np.zeros(0))
 
     def save(self, path: str | Path) -> None:
         """Write the state to an .npz file."""
@@ -104,7 +106,7 @@ class MotionState:
                 remembered = quantity("angle_branches", "SI", file["angle_branches"], ("n",))
                 lengths = index_array("branch_lengths", file["branch_lengths"])
                 known = bool(file["rotations_known"])
-                # Files of earlier versions have no contact_acceleration and no fine_faces.
+                # Files of earlier versions have no contact_acceleration, fine_faces and momentum_rate.
                 arrays = {name: file[name] for name in _ARRAYS if name in file or name in _REQUIRED}
             clock = Clock(origin, time_step, int(steps))
             parts = np.split(remembered, np.cumsum(lengths)[:-1]) if len(lengths) else []
@@ -120,7 +122,7 @@ class MotionState:
 
 
 _REQUIRED = ("state", "velocity", "acceleration", "strain_rates", "maxwell_strains", "maxwell_strain_rates")
-_ARRAYS = (*_REQUIRED, "contact_acceleration", "fine_faces")
+_ARRAYS = (*_REQUIRED, "contact_acceleration", "fine_faces", "momentum_rate")
 
 
 @immutable
