@@ -314,6 +314,14 @@ void register_model(py::module_& module) {
             "What is wrong with a state, in words; empty where nothing is.",
             py::call_guard<py::gil_scoped_release>())
         .def(
+            "not_finite",
+            [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
+                const std::lock_guard lock(model.in_use());
+                return model.not_finite(q, load_parameters);
+            },
+            "Which force is not finite at a state, in words; empty where all are.", py::arg("q"),
+            py::arg("load_parameters"), py::call_guard<py::gil_scoped_release>())
+        .def(
             "gradient",
             [](Model& model, const VectorXd& q, const LoadParameters& load_parameters) {
                 const std::lock_guard lock(model.in_use());

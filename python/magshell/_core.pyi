@@ -580,6 +580,14 @@ class Model:
         """
         Points [m] and magnetic moments [A m2] of the terms of one name, or of all of them, in the applied field, (n, 3) each.
         """
+    def not_finite(
+        self,
+        q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+        load_parameters: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"],
+    ) -> str:
+        """
+        Which force is not finite at a state, in words; empty where all are.
+        """
     def own_energies(
         self, q: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]
     ) -> list[float]:

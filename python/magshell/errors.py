@@ -112,7 +112,7 @@ class StepErrorWarning(UserWarning):
     Either their estimated error exceeds 1 % of the extent, or more than a tenth of them took over 20 factorizations: then
     they are too long. Or contact created energy in a step, however short its parts were. Or a gradient is computed through
     steps that were taken in parts, where the objective may jump.
-    It is raised once per scene, and again each time the errors have doubled. If warnings are turned into errors,
+    Every motion with large errors warns; of many factorizations a scene warns once. If warnings are turned into errors,
     `last_good` holds the motion.
     """
 

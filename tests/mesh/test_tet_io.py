@@ -56,6 +56,36 @@ def test_written_and_read_back(tmp_path, mesh):
             assert np.array_equal(found[name], values)
 
 
+@MESHES
+def test_names_of_parts_are_written_and_read_back(tmp_path, mesh):
+    """Check a name with characters that the format does not allow in fields."""
+    path = tmp_path / "solid.vtu"
+    names = {"soft": 0, "a <stiff> & wide one": 7}
+    parted = mesh.with_parts(np.where(mesh.tetrahedron_barycenters[:, 0] > 0, 7, 0), names=names)
+    ms.write_mesh(path, parted)
+    back = ms.read_mesh(path)
+    assert back.part_names == names and np.array_equal(back.parts, parted.parts)
+    assert np.array_equal(back.tetrahedra_in("soft"), parted.tetrahedra_in("soft"))
+    assert meshio.read(path).cell_data["part"][0].dtype.kind == "i"
+    assert ms.read_fields(path).tetrahedron == {}
+
+
+def test_names_of_parts_without_tetrahedra_are_warned_of(tmp_path):
+    path = tmp_path / "solid.vtu"
+    parted = LINEAR.with_parts(np.ones(LINEAR.n_tetrahedra, dtype=int), names={"all": 1, "nothing": 3})
+    with pytest.warns(ms.MeshGroupWarning, match="parts without tetrahedra are not written: 'nothing'"):
+        ms.write_mesh(path, parted)
+    assert ms.read_mesh(path).part_names == {"all": 1}
+
+
+def test_a_name_of_two_parts_is_refused(tmp_path):
+    path = tmp_path / "solid.vtu"
+    data = {"part": [np.arange(LINEAR.n_tetrahedra)], "part:both": [np.ones(LINEAR.n_tetrahedra, dtype=int)]}
+    meshio.Mesh(LINEAR.rest_positions, [("tetra", LINEAR.tetrahedra)], cell_data=data).write(path)
+    with pytest.raises(ValueError, match="'part:both' has ones in 160 parts"):
+        ms.read_mesh(path)
+
+
 def test_single_part_writes_no_field(tmp_path):
     ms.write_mesh(tmp_path / "solid.vtu", LINEAR)
     assert ms.read_fields(tmp_path / "solid.vtu") == ({}, {})

@@ -22,6 +22,29 @@ def results():
     return {"rest": rest, "cases": cases, "path": path, "move": move}
 
 
+def test_tables_of_solids_have_their_own_strains():
+    """Check solids alone, and beside a shell, in results of one and of several states."""
+    pytest.importorskip("pandas")
+    mesh = ms.meshes.box((0.1, 0.02, 0.02), cells=(2, 1, 1))
+    law = ms.StVenantKirchhoff(young_modulus=1e5, poisson_ratio=0.0)
+    bar = ms.Solid(mesh, material=law, mass_density=1e3)
+    ends = [bar.mesh.vertices_at(x=0.0), bar.mesh.vertices_at(x=0.1)]
+    pulled = [ms.Pin(ends[0]), ms.Pin(ends[1], displacement=(0.01, 0, 0))]
+    scene = ms.Scene(bar, supports=pulled)
+    stretched = 0.5 * (1.1**2 - 1.0)
+    table = ms.to_pandas(ms.equilibrium(scene))
+    assert table["largest_green_strain [1]"].to_list() == pytest.approx([stretched])
+    assert not [name for name in table if "membrane" in name or "bending" in name]
+    cases = ms.to_pandas(ms.equilibrium(scene, support_factor=[0.5, 1.0]))
+    assert cases["largest_green_strain [1]"].iloc[1] == pytest.approx(stretched)
+    path = ms.follow_path(scene)
+    strains = ms.to_pandas(path)["largest_green_strain [1]"].to_numpy()
+    assert len(strains) == len(path.parameters) and strains[0] == 0.0 and (np.diff(strains) > 0).all()
+    both = ms.Scene([bar, SHEET], supports=[*pulled, ms.Clamp(MESH.edges_at(x=0.0))])
+    table = ms.to_pandas(ms.equilibrium(both))
+    assert {"largest_green_strain [1]", "largest_membrane_strain [1]"} <= set(table)
+
+
 @pytest.mark.parametrize(
     "name, along", [("rest", ()), ("cases", ("case",)), ("path", ("parameter",)), ("move", ("time",))]
 )

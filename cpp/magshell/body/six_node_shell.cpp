@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "magshell/body/width.h"
 #include "magshell/mesh/space_filling_order.h"
 #include "magshell/strain/dihedral_angle_six.h"
 
@@ -128,13 +129,10 @@ void SixNodeShell::add_areas(VectorXd& metric) const {
 }
 
 double SixNodeShell::extent() const {
-    Vec3 lowest = rest.front().front(), highest = lowest;
-    for (const std::array<Vec3, 6>& face : rest)
-        for (const Vec3& node : face) {
-            lowest = lowest.cwiseMin(node);
-            highest = highest.cwiseMax(node);
-        }
-    return (highest - lowest).norm();
+    WeightedCenter center;
+    for (const std::array<Vec3, 6>& x : rest)
+        center.add((x[1] - x[0]).cross(x[2] - x[0]).norm(), (x[0] + x[1] + x[2]) / 3.0);
+    return width_about(center.mean(), rest);
 }
 
 double SixNodeShell::largest_coordinate(Index face) const {

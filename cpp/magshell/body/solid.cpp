@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
+#include "magshell/body/width.h"
 #include "magshell/core/errors.h"
 #include "magshell/mesh/space_filling_order.h"
 #include "magshell/strain/tetrahedron.h"
@@ -66,12 +68,12 @@ void Solid::check_volumes() const {
 }
 
 double Solid::extent() const {
-    Vec3 lowest = rest_.front(), highest = lowest;
-    for (const Vec3& node : rest_) {
-        lowest = lowest.cwiseMin(node);
-        highest = highest.cwiseMax(node);
+    WeightedCenter center;
+    for (Index t = 0; t < n_elements(); ++t) {
+        const Vec3* x = &rest_[t * width_];
+        center.add(volume_of(t), (x[0] + x[1] + x[2] + x[3]) / 4.0);
     }
-    return (highest - lowest).norm();
+    return width_about(center.mean(), std::span(&rest_, 1));
 }
 
 double Solid::volume_of(Index element) const {

@@ -36,7 +36,7 @@ class Solid final : public Body {
 
     bool quadratic() const { return linear_nodes.empty(); }
     const Surface* surface() const { return surface_.get(); }
-    /// Returns the diagonal of the bounding box at rest [m].
+    /// Returns twice the largest distance of a node from the center at rest [m], which rotations keep.
     double extent() const;
     /// Returns the smallest height of an element at rest, between its corners [m].
     double smallest_height() const;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "magshell/body/width.h"
 #include "magshell/mesh/space_filling_order.h"
 
 namespace magshell {
@@ -45,13 +46,9 @@ double Surface::smallest_height(Index face) const {
 }
 
 double Surface::extent() const {
-    Vec3 lowest = rest_corners_.front().front(), highest = lowest;
-    for (const std::array<Vec3, 3>& face : rest_corners_)
-        for (const Vec3& corner : face) {
-            lowest = lowest.cwiseMin(corner);
-            highest = highest.cwiseMax(corner);
-        }
-    return (highest - lowest).norm();
+    WeightedCenter center;
+    for (const auto& [a, b, c] : rest_corners_) center.add((b - a).cross(c - a).norm(), (a + b + c) / 3.0);
+    return width_about(center.mean(), rest_corners_);
 }
 
 }  // namespace magshell

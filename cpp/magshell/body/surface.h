@@ -28,7 +28,7 @@ class Surface {
     double largest_coordinate(Index face) const;
     /// Returns the smallest height of a face at rest [m].
     double smallest_height(Index face) const;
-    /// Returns the diagonal of the bounding box at rest [m].
+    /// Returns twice the largest distance of a corner from the center at rest [m], which rotations keep.
     double extent() const;
 
     const std::string owner;

@@ -81,7 +81,7 @@ class Bodies {
 
     /// Returns the rest position of each dof [m]: that of its vertex, or the middle of its edge.
     std::vector<Vec3> dof_points() const;
-    /// Returns the diagonal of the bounding box of the largest body at rest [m].
+    /// Returns twice the largest distance of a node from the center of its body at rest [m], which rotations keep.
     double extent() const;
     /// Returns the largest coordinate at rest [m].
     double reach() const;

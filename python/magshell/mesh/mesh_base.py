@@ -49,6 +49,18 @@ class MeshBase(PlotMixin, GroupSelection):
         return frozen(self.rest_positions[self.edges].mean(axis=1))
 
 
+def width_of(mesh: MeshBase) -> float:
+    """Return a mesh's width in the rest shape, m: twice the largest distance of a vertex from the center of the
+    surface.
+
+    For a rectangle and a box that is the diagonal. Rotations keep it, which change the sides of a bounding box.
+    """
+    corners = mesh.rest_positions[mesh.faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    middle = areas @ corners.mean(axis=1) / areas.sum()
+    return 2.0 * float(np.linalg.norm(mesh.rest_positions - middle, axis=1).max())
+
+
 def frozen(array: np.ndarray) -> np.ndarray:
     """Return the same array, made read-only."""
     array.setflags(write=False)

@@ -141,7 +141,8 @@ class Newton:
         the final loads (proximal continuation). A value up to 1/64 is made smaller where the displacement is many extents.
     max_relaxation_steps: the largest number of steps of that descent.
     max_factorizations: the largest number of factorizations of an equilibrium, after which NotConverged is raised; 20
-        iterations without a factorization count as one. No case of tests/hard takes more than half of the default.
+        iterations without a factorization count as one. No case of tests/hard takes more than half of the default. A tenth
+        of it in a scene with an ms.Cavity of a given pressure, whose energy has no lower bound beyond a limit point.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))

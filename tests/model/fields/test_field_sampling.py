@@ -59,11 +59,11 @@ def test_the_estimated_error_of_a_force_is_its_error_within_a_tenth(cells, gap):
     assert found.error == pytest.approx(true_error(cells, gap), rel=0.1)
 
 
-@pytest.mark.parametrize(("cells", "too_coarse"), [(11, True), (14, False)])
-def test_faces_sample_finely_where_the_force_is_off_by_more_than_1_percent(cells, too_coarse):
-    """Check two meshes whose true errors are 1.20 % and 0.68 %."""
+@pytest.mark.parametrize(("cells", "too_coarse"), [(26, True), (30, False)])
+def test_faces_sample_finely_where_the_force_is_off_by_more_than_0_1_percent(cells, too_coarse):
+    """Check two meshes whose true errors are 0.13 % and 0.08 %."""
     gap = 2e-3
-    assert (true_error(cells, gap) > 0.01) == too_coarse
+    assert (true_error(cells, gap) > 0.001) == too_coarse
     scene = between_plates(cells, gap)
     assert fine_faces(ms.equilibrium(scene)._values).any() == too_coarse
 
@@ -128,7 +128,10 @@ def estimate(scene, **values) -> float:
 
 
 @pytest.mark.parametrize("irregular", [0.0, 0.2])
-@pytest.mark.parametrize(("cells", "gap"), [(16, 2e-3), (16, 1e-3), (32, 1e-3), (24, 0.5e-3), (32, 0.5e-3)])
+@pytest.mark.parametrize(
+    ("cells", "gap"),
+    [(16, 5e-3), (32, 1.5e-3), (16, 2e-3), (16, 1e-3), (32, 1e-3), (24, 0.5e-3), (32, 0.5e-3)],
+)
 def test_the_estimate_of_the_core_is_0_6_to_1_2_times_the_error(cells, gap, irregular):
     scene = between_plates(cells, gap, irregular=irregular)
     (found,) = sampling_errors(scene._values, scene.mesh.rest_positions, 1.0, None)
@@ -168,7 +171,7 @@ def test_a_field_that_a_mesh_resolves_is_sampled_at_no_more_points(monkeypatch):
     asked = []
     whole = ms._core.sample_fields
     monkeypatch.setattr(ms._core, "sample_fields", lambda *each: asked.append(each) or whole(*each))
-    ms.equilibrium(between_plates(16, 4e-3))
+    ms.equilibrium(between_plates(16, 30e-3))
     assert not asked
     ms.equilibrium(between_plates(11, 2e-3))
     assert len(asked) >= 4
@@ -176,10 +179,10 @@ def test_a_field_that_a_mesh_resolves_is_sampled_at_no_more_points(monkeypatch):
 
 @pytest.mark.parametrize(("gap", "too_coarse"), [(2e-3, True), (8e-3, False)])
 def test_a_path_is_warned_of_at_the_point_where_the_error_is_largest(gap, too_coarse):
-    scene = between_plates(6, 20e-3, young_modulus=1e11)
+    scene = between_plates(6, 100e-3, young_modulus=1e11)
     magnet = scene.fields[0]
     start = ms.equilibrium(scene)
-    nearer = {magnet: {"center": (0.0, 0.0, 20e-3 - gap)}}
+    nearer = {magnet: {"center": (0.0, 0.0, 100e-3 - gap)}}
     told = warned(lambda: ms.follow_path(scene, values=nearer, start=start, first_step=0.5, max_step=1.0))
     assert len(told) == too_coarse
     if told:

@@ -48,6 +48,19 @@ def test_the_force_of_a_near_magnet_is_right_to_0_1_percent(cells, gap, law, nor
     assert found == pytest.approx(exact, abs=1e-3 * np.linalg.norm(exact))
 
 
+@pytest.mark.parametrize("cells", [16, 32])
+@pytest.mark.parametrize("normal", [True, False])
+def test_the_force_of_a_magnet_is_right_to_0_1_percent_at_every_distance(cells, normal):
+    """Check gaps from a thickness to ten lengths. Faces sampled once up to an error of 1 %: 0.8 % was left at 1.5 mm."""
+    size = (WIDTH, WIDTH, THICKNESS)
+    off = {}
+    for gap in (0.2e-3, 0.5e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 5e-3, 10e-3, 30e-3, 100e-3):
+        exact = cuboid_force(size, size, (0, 0, gap + THICKNESS), 2 if normal else 0, POLARIZATION)
+        found = force(plate_at_magnet(cells, gap, normal=normal))
+        off[gap] = np.linalg.norm(found - exact) / np.linalg.norm(exact)
+    assert max(off.values()) < 1e-3, off
+
+
 def strained(law, young_modulus=1e3):
     """Return a scene near a magnet, and positions, magnetization and a thickness, all different from face to face."""
     scene = plate_at_magnet(4, 0.3e-3, law=law, young_modulus=young_modulus)
@@ -108,25 +121,25 @@ def test_a_start_of_another_scene_is_refused_by_name_where_faces_sample_finely()
         ms.equilibrium(plate_at_magnet(4, 0.2e-3, young_modulus=1e10), start=other)
 
 
-@pytest.mark.parametrize("gap", [4e-3, 0.1])
+@pytest.mark.parametrize("gap", [10e-3, 0.1])
 def test_faces_far_from_a_magnet_sample_its_field_once(gap):
     assert not fine_faces(ms.equilibrium(plate_at_magnet(16, gap, young_modulus=1e9))._values).any()
 
 
 @pytest.mark.parametrize("moment", [(0, 0, 1), (1, 0, 0), (1, 1, 1)])
 @pytest.mark.parametrize("along", [(0, 0, 1), (1, 1, 0)])
-def test_no_face_beyond_eight_edges_from_a_dipole_samples_finely(moment, along):
-    """Check that the error at eight edges is not one that faces sample finely for."""
+def test_no_face_beyond_24_edges_from_a_dipole_samples_finely(moment, along):
+    """Check that the error at 24 edges is not one that faces sample finely for."""
     mesh = ms.meshes.rectangle(WIDTH, WIDTH, cells=(4, 4), diagonals="aligned")
     direction = np.array(along) / np.linalg.norm(along)
     nearest = (mesh.rest_positions @ direction).max() - WIDTH / 2 * direction[:2].sum()
-    center = np.array([WIDTH / 2, WIDTH / 2, 0.0]) + (nearest + 8 * mesh.edge_lengths.max()) * direction
+    center = np.array([WIDTH / 2, WIDTH / 2, 0.0]) + (nearest + 24 * mesh.edge_lengths.max()) * direction
     sheet = ms.Shell(
         mesh, thickness=THICKNESS, young_modulus=1e9, remanent_magnetization=np.array(moment) * 1e5
     )
     scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.Dipoles([center], [moment]))
     (found,) = sampling_errors(scene._values, mesh.rest_positions, 1.0, None)
-    assert found.error < 0.01
+    assert found.error < 0.001
 
 
 def flap(young_modulus=2e7, **extra):
@@ -202,8 +215,12 @@ def test_gradients_agree_with_differences_after_a_search_that_needed_more_fine_f
 
 
 def test_a_path_keeps_the_fine_faces_of_its_start_and_warns_where_they_are_too_few():
+    scene = flap()
+    magnet = scene.fields[0]
+    far = ms.equilibrium(scene, load_factor=0.0, values={magnet: {"center": (0, 0, -60e-3)}})
+    near = {magnet: {"center": (0, 0, 0)}}
     with pytest.warns(ms.FieldSamplingWarning, match=r"the path, at point .* sample the field once each"):
-        path = ms.follow_path(flap(), load_factor=PUSH, max_step=0.1)
+        path = ms.follow_path(scene, start=far, values=near, load_factor=PUSH, max_step=0.1)
     assert not fine_faces(path._values_at(0)).any()
     start = ms.equilibrium(flap_scene := flap(), load_factor=PUSH)
     back = ms.follow_path(flap_scene, start=start, load_factor=0.9 * PUSH)
@@ -237,11 +254,20 @@ def test_a_motion_goes_on_with_the_same_fine_faces_from_a_file_too(tmp_path):
 
 
 def test_a_motion_that_comes_near_a_magnet_warns():
-    scene = flap(young_modulus=1e4)
-    down = np.zeros((scene.mesh.n_vertices, 3))
-    down[:, 2] = -1.0 * (scene.mesh.rest_positions[:, 0] + WIDTH / 2) / WIDTH
+    """Throw a sheet from 60 mm, where its faces may sample once, to 2 mm above the magnet."""
+    clamped = flap()
+    mesh = clamped.mesh.transformed(translation=(0, 0, 56e-3))
+    sheet = ms.Shell(
+        mesh,
+        thickness=THICKNESS,
+        young_modulus=2e7,
+        mass_density=1e3,
+        remanent_magnetization=(0, 0, MAGNETIZATION),
+    )
+    scene = ms.Scene(sheet, field=clamped.fields[0], allow_rigid_motions=True)
+    down = np.broadcast_to((0, 0, -58e-3 / 3e-3), (mesh.n_vertices, 3))
     with pytest.warns(ms.FieldSamplingWarning, match="the motion, in recorded state"):
-        ms.simulate(scene, steps=30, time_step=1e-4, load_factor=0.0, velocities=down, progress=False)
+        ms.simulate(scene, steps=30, time_step=1e-4, velocities=down, progress=False)
 
 
 def test_faces_that_reach_out_of_a_grid_are_warned_of():

@@ -154,12 +154,21 @@ def test_bad_growth_in_a_solve_is_refused():
     scene = held(sheet)
     for value, message in (
         (np.ones(N), r"growth \[1\] was made with shape \(\) and keeps it"),
+        (
+            np.ones((3, 3)),
+            r"\(steps \+ 1\), got \(3, 3\): where faces are to have their own later, or directions, give",
+        ),
         (-1.0, r"growth \[1\] must be positive, but it is -1"),
     ):
         with pytest.raises(ValueError, match=message):
             ms.equilibrium(scene, values={sheet: {"growth": value}})
     with pytest.raises(ValueError, match=r"growth \[1\] must be positive, but it is -1|must be positive"):
         ms.simulate(scene, steps=2, time_step=1e-3, values={sheet: {"growth": np.array([1.0, 0.5, -1.0])}})
+    with pytest.raises(
+        ValueError,
+        match=r"was made with shape \(\) and keeps it, over the time of a motion \(steps \+ 1\), got",
+    ):
+        ms.simulate(scene, steps=2, time_step=1e-3, values={sheet: {"growth": np.ones((3, N))}})
     with pytest.raises(ValueError, match="Shell has no value 'growth' to be replaced"):
         ms.equilibrium(held(other), values={other: {"growth": 1.1}})
 

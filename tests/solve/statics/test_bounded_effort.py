@@ -1,5 +1,6 @@
 """Bounded effort of a search for an equilibrium: it gives up and reports its state and the likely cause."""
 
+import numpy as np
 import pytest
 
 import magshell as ms
@@ -58,6 +59,51 @@ def test_the_default_is_twice_what_the_dearest_hard_case_takes():
     A strongly bent strip with a face of 1e-5 times its neighbours' size takes 2,531 factorizations.
     """
     assert ms.MixedNewton().max_factorizations == ms.Newton().max_factorizations == 5000
+
+
+def blown_up(pressure):
+    """Return a scene of a box of rubber, 1 cm, with a hollow in its middle that a pressure blows up."""
+    box = ms.meshes.box((0.01, 0.01, 0.01), cells=(3, 3, 3))
+    inside = (np.abs(box.tetrahedron_barycenters - 0.005) < 0.01 / 6).all(axis=1)
+    used, tetrahedra = np.unique(box.tetrahedra[~inside], return_inverse=True)
+    mesh = ms.TetMesh(box.rest_positions[used], tetrahedra.reshape(-1, 4))
+    law = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.4)
+    body = ms.Solid(mesh, material=law, element="linear")
+    floor = ms.Pin(mesh.vertices_at(z=0.0))
+    return ms.Scene(body, supports=[floor], actuators=[ms.Cavity(body, pressure=pressure)])
+
+
+def test_beyond_a_limit_point_of_a_pressure_a_search_ends_soon_and_names_follow_path():
+    """Check a pressure that no equilibrium nearby bears, below which there are some."""
+    assert ms.equilibrium(blown_up(2e4)).stable
+    with pytest.raises(
+        ms.NotConverged, match=r"probably at a limit point, .*: ms\.follow_path, with the same"
+    ) as caught:
+        ms.equilibrium(blown_up(5e5))
+    assert caught.value.last_good.factorizations <= 502
+
+
+def test_a_lid_that_hangs_on_edges_of_a_solid_is_named():
+    """Check a cup of rubber, whose cavity is closed by a lid without stiffness on its inner edges."""
+    size, wall = 0.04, 0.01
+    box = ms.meshes.box((size, size, 0.03), cells=(4, 4, 3))
+    x = box.tetrahedron_barycenters
+    inside = (np.abs(x[:, :2] - size / 2) < size / 2 - wall).all(axis=1) & (x[:, 2] > wall)
+    used, tetrahedra = np.unique(box.tetrahedra[~inside], return_inverse=True)
+    mesh = ms.TetMesh(box.rest_positions[used], tetrahedra.reshape(-1, 4))
+    law = ms.NeoHookean(young_modulus=1e5, poisson_ratio=0.45)
+    cup = ms.Solid(mesh, material=law, element="linear")
+    middle = mesh.rest_positions[mesh.faces].mean(axis=1)
+    faces = (np.abs(middle[:, :2] - size / 2) < size / 2 - wall + 1e-6).all(axis=1)
+    faces &= (middle[:, 2] > wall - 1e-6) & (middle[:, 2] < 0.03 - 1e-6)
+    cavity = ms.Cavity(cup, faces, pressure=2e5, close_rims=True)
+    scene = ms.Scene(cup, supports=[ms.Pin(mesh.vertices_at(z=0.0))], actuators=[cavity])
+    rim = cavity.rim_on_solids(scene._bodies)
+    assert len(rim) == 8 and np.allclose(mesh.rest_positions[rim, 2], 0.03)
+    with pytest.raises(
+        ms.NotConverged, match=r"The lid of a cavity .* hangs on edges of a solid, at vertices"
+    ):
+        ms.equilibrium(scene)
 
 
 @pytest.mark.parametrize("wrong", [0, -1, 2.5, True, 2**31])

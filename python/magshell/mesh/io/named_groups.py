@@ -21,6 +21,7 @@ from ...errors import MeshGroupWarning
 from ..groups import Groups, Members, counts, joined, members
 
 _PREFIX = "group:"
+_PART_PREFIX = "part:"
 _SAFE = "-_.+:/()[]"  # characters that every format can have in the name of a field
 _PHYSICAL = "gmsh:physical"
 _PHYSICAL_NAME = re.compile(rb'^\s*(\d+)\s+(\d+)\s+"(.*)"\s*$', re.MULTILINE)
@@ -164,10 +165,35 @@ def field_name(group: str) -> str:
 
 def check_no_group_field(kind: str, name: str) -> None:
     """Raise ValueError for a field of the user's with a name that stands for a group."""
-    if name.startswith(_PREFIX):
-        raise ValueError(
-            f"{kind} field {name!r}: names that begin with {_PREFIX!r} stand for groups; use mesh.with_groups(...)"
-        )
+    for prefix, what, use in (
+        (_PREFIX, "groups", "mesh.with_groups(...)"),
+        (_PART_PREFIX, "parts", "mesh.with_parts(..., names=)"),
+    ):
+        if name.startswith(prefix):
+            raise ValueError(
+                f"{kind} field {name!r}: names that begin with {prefix!r} stand for {what}; use {use}"
+            )
+
+
+def part_name_fields(parts: np.ndarray, names: Mapping[str, int]) -> dict[str, np.ndarray]:
+    """Return the fields of zeros and ones that stand for the names of parts, {name: (n_t,)}."""
+    return {
+        _PART_PREFIX + quote(name, safe=_SAFE): (parts == number).astype(np.int32)
+        for name, number in names.items()
+    }
+
+
+def take_part_names(fields: dict[str, np.ndarray], parts: np.ndarray) -> dict[str, int]:
+    """Take the names of parts (n_t,) out of the fields of a file. Raises ValueError if one belongs to none or to several."""
+    found = {}
+    for field_of_name in [each for each in fields if each.startswith(_PART_PREFIX)]:
+        numbers = np.unique(parts[fields.pop(field_of_name) == 1])
+        if len(numbers) != 1:
+            raise ValueError(
+                f"the cell field {field_of_name!r} has ones in {len(numbers)} parts; one is named by it"
+            )
+        found[unquote(field_of_name[len(_PART_PREFIX) :])] = int(numbers[0])
+    return found
 
 
 def mask(count: int, rows: np.ndarray) -> np.ndarray:

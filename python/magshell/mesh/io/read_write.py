@@ -40,7 +40,7 @@ from .named_groups import (
 )
 from .ply import read_ply, write_ply
 from .surface_formats import TriangleContent, read_obj, solids_of_stl
-from .tetrahedra import TetContent, TetFields, cells_and_data, tetrahedra_of
+from .tetrahedra import TetContent, TetFields, cell_data_of, cells_of, tetrahedra_of
 
 if TYPE_CHECKING:
     from ..._input.kinds import FilePath, Numbers
@@ -145,8 +145,8 @@ def write_mesh(
 
     Args:
         path: the file, which ends in .vtu, .msh (format 4.1, in text, without fields) or .ply.
-        mesh: the mesh to write. The parts of tetrahedra are written as the cell field `part`, without their names. Fields on
-            the faces of a solid are written with the mesh's `surface`. The curved elements of a QuadraticTriangleMesh are
+        mesh: the mesh to write. The parts of tetrahedra are written as the cell field `part`, their names as fields of zeros
+            and ones, `part:` and the name. Fields on the faces of a solid are written with the mesh's `surface`. The curved elements of a QuadraticTriangleMesh are
             written, and `face_fields` belong to them; fields on its flat faces are written with its `surface` as well.
             Named groups are written as fields of zeros and ones, `group:` and the name; a VTU file gets cells for edges
             and for faces of a solid in groups, where other fields are NaN or -1. PLY has no groups of edges. An MSH file
@@ -196,7 +196,7 @@ def write_mesh(
     on_vertices = _checked_fields("vertex", vertex_fields, mesh.n_vertices) | vertex_group_fields(mesh)
     if solid:
         on_cells = _checked_fields("tetrahedron", tetrahedron_fields, mesh.n_tetrahedra)
-        cells, cell_data = cells_and_data(mesh, on_cells)
+        cells, cell_data = cells_of(mesh), cell_data_of(mesh, on_cells)
     else:
         on_faces = _checked_fields("face", face_fields, mesh.n_elements)
         cells = [(_TRIANGLES[mesh.order - 1], mesh.elements)]

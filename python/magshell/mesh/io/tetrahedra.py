@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -9,8 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..._input.arrays import integer_array
+from ..._runtime.warning_stacklevel import callers_level
+from ...errors import MeshGroupWarning
 from ..tetrahedra.tet_mesh import TetMesh
-from .named_groups import Named, drop_group_fields, groups_of_vertex_fields, merged_names
+from .named_groups import (
+    Named,
+    drop_group_fields,
+    groups_of_vertex_fields,
+    merged_names,
+    part_name_fields,
+    take_part_names,
+)
 
 # gmsh writes them in addition to the solid
 LOWER_CELLS = ("vertex", "line", "line3", "triangle", "triangle6")
@@ -42,7 +52,9 @@ class TetContent:
         fields = dict(self.tetrahedron_fields)
         chosen = next((name for name in _PART_FIELDS if name in fields), None)
         parts = None if chosen is None else integer_array(f"the cell field {chosen!r}", fields.pop(chosen))
-        mesh = TetMesh(self.points, self.tetrahedra, parts, self.part_names)
+        numbers = np.zeros(len(self.tetrahedra), dtype=int) if parts is None else parts
+        names = self.part_names | take_part_names(fields, numbers)
+        mesh = TetMesh(self.points, self.tetrahedra, parts, names)
         return mesh, TetFields(self.vertex_fields, drop_group_fields(fields))
 
 
@@ -83,16 +95,30 @@ def tetrahedra_of(content: Any, named: Callable[[str], Named]) -> TetContent | N
     )
 
 
-def cells_and_data(mesh: TetMesh, fields: dict[str, np.ndarray]) -> tuple[list[Any], dict[str, list[Any]]]:
-    """Convert a mesh and its fields to meshio's cells and cell data.
+def cells_of(mesh: TetMesh) -> list[Any]:
+    """Return the tetrahedra of a mesh as meshio's cells."""
+    return [(_KINDS[mesh.order - 1], mesh.tetrahedra)]
 
-    Parts are written as the cell field `part`, unless all of them are 0.
+
+def cell_data_of(mesh: TetMesh, fields: dict[str, np.ndarray]) -> dict[str, list[Any]]:
+    """Convert the fields of a mesh to meshio's cell data.
+
+    Parts are written as the cell field `part`, unless all of them are 0, and their names as fields of zeros and ones.
     """
     data = {name: [values] for name, values in fields.items()}
+    there = set(np.unique(mesh.parts).tolist())
+    named = {name: number for name, number in mesh.part_names.items() if number in there}
+    if lost := [name for name in mesh.part_names if name not in named]:
+        warnings.warn(
+            f"parts without tetrahedra are not written: {', '.join(map(repr, lost))}",
+            MeshGroupWarning,
+            stacklevel=callers_level(),
+        )
+    data |= {name: [values] for name, values in part_name_fields(mesh.parts, named).items()}
     if mesh.parts.any():
         if _PART in data:
             raise ValueError(
                 f"tetrahedron field {_PART!r}: the mesh's own parts have this name; choose another"
             )
         data[_PART] = [np.asarray(mesh.parts)]
-    return [(_KINDS[mesh.order - 1], mesh.tetrahedra)], data
+    return data

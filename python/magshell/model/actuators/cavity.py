@@ -14,7 +14,7 @@ from ..shells.shell import Shell
 from ..solids.solid import Solid
 from .actuator import Actuator, number
 from .actuator_results import CavityResult
-from .closed_surface import ClosedSurface, of_faces
+from .closed_surface import ClosedSurface, of_faces, rim_vertices
 
 if TYPE_CHECKING:
     from ..._input.kinds import Computed, Numbers
@@ -48,7 +48,8 @@ class Cavity(Actuator):
         volume to this volume, so load steps can reach a volume far from rest.
 
     close_rims: close open rims by lids without stiffness, fans of triangles from one vertex of each rim, flat if the rim
-        is flat. The pressure on them acts on the rim.
+        is flat. The pressure on them acts on the rim, of a solid as a load on its edges, near which strains grow without
+        limit where the mesh is refined: hold such a rim by a support.
 
     All of its values may change in time, and have gradients. Results: `result[cavity].volume` (m3) and `.pressure` (Pa,
     relative to the outside). States in which a cavity has no volume are refused, as those with inverted elements are.
@@ -138,6 +139,15 @@ class Cavity(Actuator):
         return of_faces(
             bodies, [(body, _chosen(body, faces)) for body, faces in self._parts], self.close_rims
         )
+
+    def rim_on_solids(self, bodies: Bodies) -> np.ndarray:
+        """Return the vertices of the scene from which a lid hangs on edges of solids, (k,)."""
+        if not self.close_rims:
+            return np.zeros(0, dtype=int)
+        rim = rim_vertices(bodies, [(body, _chosen(body, faces)) for body, faces in self._parts])
+        solids = [bodies.spans[bodies.number(body)] for body in self.bodies if isinstance(body, Solid)]
+        numbers = [bodies.original[span.vertices] for span in solids]
+        return rim[np.isin(rim, np.concatenate([np.zeros(0, dtype=int), *numbers]))]
 
     def rest_volume(self, scene: Scene) -> float:
         """Return the volume in the rest shape of a scene, m3."""

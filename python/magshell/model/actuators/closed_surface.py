@@ -76,15 +76,7 @@ def of_faces(
 
     Raises ValueError if the surface is not closed, or inside out.
     """
-    flat, curved, signs = [np.zeros((0, 3), int)], [np.zeros((0, 6), int)], ([np.zeros(0)], [np.zeros(0)])
-    for body, faces in parts:
-        span = bodies.spans[bodies.number(body)]
-        nodes = bodies.original[span.vertices][_sides_of(body, faces)]
-        kind = int(nodes.shape[1] == 6)
-        (flat, curved)[kind].append(nodes)
-        signs[kind].append(np.full(len(nodes), -1.0 if isinstance(body, Solid) else 1.0))
-    triangles, weights = np.concatenate(flat), np.concatenate(signs[0])
-    curved_nodes, curved_weights = np.concatenate(curved), np.concatenate(signs[1])
+    triangles, weights, curved_nodes, curved_weights = _faces_of(bodies, parts)
     rim = _open_edges(triangles, weights, curved_nodes, curved_weights)
     if len(rim):
         if not close_rims:
@@ -100,6 +92,25 @@ def of_faces(
     surface = ClosedSurface(triangles, weights, curved_nodes, curved_weights)
     _check_volume(bodies.mesh.rest_positions, surface)
     return surface
+
+
+def rim_vertices(bodies: Bodies, parts: Sequence[tuple[Shell | Solid, np.ndarray | None]]) -> np.ndarray:
+    """Return the vertices of the scene on the open rims of the faces of several bodies, as of_faces() takes them, (k,)."""
+    return np.unique(_open_edges(*_faces_of(bodies, parts))[:, :2])
+
+
+def _faces_of(
+    bodies: Bodies, parts: Sequence[tuple[Shell | Solid, np.ndarray | None]]
+) -> tuple[np.ndarray, ...]:
+    """Return the flat and the curved faces of several bodies with their weights, as ClosedSurface has them."""
+    flat, curved, signs = [np.zeros((0, 3), int)], [np.zeros((0, 6), int)], ([np.zeros(0)], [np.zeros(0)])
+    for body, faces in parts:
+        span = bodies.spans[bodies.number(body)]
+        nodes = bodies.original[span.vertices][_sides_of(body, faces)]
+        kind = int(nodes.shape[1] == 6)
+        (flat, curved)[kind].append(nodes)
+        signs[kind].append(np.full(len(nodes), -1.0 if isinstance(body, Solid) else 1.0))
+    return np.concatenate(flat), np.concatenate(signs[0]), np.concatenate(curved), np.concatenate(signs[1])
 
 
 def of_tetrahedra(tetrahedra: np.ndarray) -> ClosedSurface:

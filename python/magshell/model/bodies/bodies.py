@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..._input.checked_list import checked_list
+from ...mesh.mesh_base import width_of
 from ...mesh.triangles.face_quality import MeshQuality
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
@@ -216,14 +217,9 @@ class Bodies:
         return tuple(body.skin for body in self.solids if body.skin is not None)
 
     @cached_property
-    def size(self) -> float:
-        """The diagonal of the bounding box of the largest body, m."""
-        return max((mesh.size for mesh in self.meshes), default=0.0)
-
-    @cached_property
     def extent(self) -> float:
-        """The longest side of a bounding box among all bodies, m."""
-        return max((float(np.ptp(mesh.rest_positions, axis=0).max()) for mesh in self.meshes), default=0.0)
+        """The width of the widest shell or solid, m, which rotations keep: see width_of()."""
+        return max(map(width_of, self.meshes), default=0.0)
 
     def number(self, body: Shell | Solid) -> int:
         """Return the number of a shell or solid. Raises ValueError if it is not in the scene."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..._input.owner import Owner
 from ..._input.scalars import flag, not_negative, positive
+from ...mesh.mesh_base import width_of
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..bodies.bodies import BODIES
 from ..rigid.rigid import RigidBody
@@ -16,20 +17,6 @@ from ..solids.solid import Solid
 
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
-    from ...mesh.mesh_base import MeshBase
-
-
-def width_of(mesh: MeshBase) -> float:
-    """Return a mesh's width in the rest shape, m: twice the largest distance of a vertex from the center of the
-    surface.
-
-    For a rectangle and a box that is the diagonal.
-    """
-    corners = mesh.rest_positions[mesh.faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    middle = areas @ corners.mean(axis=1) / areas.sum()
-    return 2.0 * float(np.linalg.norm(mesh.rest_positions - middle, axis=1).max())
-
 
 _REACH_OF_SHEETS = 0.1  # [-] default activation distance over the thickness
 _REACH_OF_SOLIDS = 0.05  # [-] default activation distance over the mean edge on the surface

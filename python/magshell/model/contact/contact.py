@@ -12,12 +12,13 @@ from ..._input.owner import Owner
 from ..._input.scalars import not_negative, positive
 from ..._input.selections import indices, selection
 from ..._runtime.solver_entry_point import grouped
+from ...mesh.mesh_base import width_of
 from ...mesh.triangles.triangle_mesh import TriangleMesh
 from ..bodies.bodies import BODIES, checked_body, joined, on_body
 from ..rigid.rigid import RigidBody
 from ..shells.shell import Shell
 from ..solids.solid import Solid
-from .body_contact import BodyContact, width_of
+from .body_contact import BodyContact
 from .obstacles import Attached, Obstacle
 from .round_shapes import RoundPair, checked_shapes, round_pairs
 

@@ -72,8 +72,22 @@ def describe_strains(result: SolveResult, of_sheets: str) -> str:
             continue
         strains = SolidResult(result, solid)._states()
         ratios, stress = strains.volume_ratios, strains.von_mises_stresses
+        of_means = ""
+        if solid.mean_volume:  # the energy is one of the means: at single points J has no meaning
+            ratios, of_means = strains.mean(ratios), " (means of elements)"
         lines.append(
-            f"{name}: J {ratios.min():.4g} to {ratios.max():.4g}, largest principal Green strain "
+            f"{name}: J {ratios.min():.4g} to {ratios.max():.4g}{of_means}, largest principal Green strain "
             f"{100 * strains.largest_green_strain:.3g} %, von Mises stress at most {stress.max():.4g} Pa{last}"
         )
     return "\n  ".join(lines)
+
+
+def largest_green_strains(result: SolveResult) -> np.ndarray:
+    """Return the largest magnitude of a principal Green strain in all solids, in every state (n,), or () in a single one."""
+    solids = result.scene._bodies.solids
+    single = np.ndim(result.positions) == 2
+    states = [-1] if single else range(len(result.positions))
+    largest = [
+        max(SolidResult(result, solid).strains(k).largest_green_strain for solid in solids) for k in states
+    ]
+    return np.array(largest[0] if single else largest)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -51,18 +51,18 @@ class FacePoints(NamedTuple):
 
 
 @cache
-def tetrahedron_rule(per_edge: int | None, order: int) -> tuple[np.ndarray, np.ndarray]:
+def tetrahedron_rule(rule: Literal["own", "four", "fine", "finer"]) -> tuple[np.ndarray, np.ndarray]:
     """Return barycentric coordinates (p, 4) and weights (p,), which sum to 1/6.
 
-    per_edge: points along an edge of Gauss' product rule of the cube, collapsed to a tetrahedron; None for the rule of the
-    elements, of first or second order.
+    rule: "own" of four-node elements, "four", that of ten-node ones, "fine" of elements that sample finely, "finer" of those
+    that show their error: Gauss' product rule of the cube, collapsed to a tetrahedron, four and six points along an edge.
     """
-    if per_edge is None:
-        if order == 1:
-            return np.full((1, 4), 0.25), np.full(1, 1.0 / 6.0)
+    if rule == "own":
+        return np.full((1, 4), 0.25), np.full(1, 1.0 / 6.0)
+    if rule == "four":
         a, b = (5.0 - np.sqrt(5.0)) / 20.0, (5.0 + 3.0 * np.sqrt(5.0)) / 20.0
         return a + (b - a) * np.eye(4), np.full(4, 1.0 / 24.0)
-    line, lengths = np.polynomial.legendre.leggauss(per_edge)
+    line, lengths = np.polynomial.legendre.leggauss(4 if rule == "fine" else 6)
     u, v, w = (each.ravel() for each in np.meshgrid(*(3 * [0.5 * (line + 1.0)]), indexing="ij"))
     a, b, c = (each.ravel() for each in np.meshgrid(*(3 * [0.5 * lengths]), indexing="ij"))
     first, second, third = u, v * (1.0 - u), w * (1.0 - u) * (1.0 - v)

@@ -3,7 +3,8 @@
 A four-node tetrahedron takes the force at its center, a ten-node one at four points, a six-node face at six points of its
 middle surface. Near a source the mean force over an element differs from that. Elements that sample finely (fine_faces.py
 says which do) take it at 64 points, of a face at 32 points on two levels through its thickness. The mean force is that at
-these points, of elements that sample finely that at 216 points, or 72 on three levels.
+these points, of elements that sample finely that at 216 points, or 72 on three levels, and of four-node tetrahedra farther
+from the sources that at four points.
 """
 
 from __future__ import annotations
@@ -25,17 +26,17 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .values import Values
 
-# Distance d of an element from sources, over its longest edge a, beyond which the points that a solve samples are enough:
-# the mean of a dipole's force over a face is that at its barycenter to (a/d)^2 10/18, 0.9 % here; fixed by
-# test_no_face_beyond_eight_edges_from_a_dipole_samples_finely
-FAR_EDGES = 8.0
+# Distance d of an element from sources, over its longest edge a, beyond which the points that a solve samples are enough.
+# The mean of a dipole's force over a face is that at its barycenter to (a/d)^2 10/18, 0.1 % here; fixed by
+# test_no_face_beyond_24_edges_from_a_dipole_samples_finely
+FAR_EDGES = 24.0
+# The same of elements with points that are exact to second degree or more: (a/d)^3 is 0.2 % of each force here
+FAR_EDGES_OF_MORE_POINTS = 8.0
 _TOGETHER = 512  # elements whose samples are in memory at the same time
-# Points of the rules of a tetrahedron along an edge: of elements that sample finely, and of those that show their error
-_PER_EDGE = {"fine": 4, "finer": 6}
 # The name in the core of the value of a face or an element that is 1 where it samples finely.
 KEY = "field_sampling"
 
-Rule = Literal["own", "fine", "finer"]
+Rule = Literal["own", "four", "fine", "finer"]
 
 
 class Sources(NamedTuple):
@@ -48,14 +49,14 @@ class Sources(NamedTuple):
     uniform: np.ndarray
     spheres: list[tuple[np.ndarray, float] | None]
 
-    def are_near(self, centers: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Return which elements with these centers (n, 3) m and sizes (n,) m may be near a source, (n,)."""
+    def are_near(self, centers: np.ndarray, reaches: np.ndarray) -> np.ndarray:
+        """Return which centers (n, 3) m may be within reaches (n,) m of a source, (n,)."""
         near = np.zeros(len(centers), dtype=bool)
         for sphere in self.spheres:
             if sphere is None:
                 return np.ones(len(centers), dtype=bool)
             center, radius = sphere
-            near |= np.linalg.norm(centers - center, axis=1) - radius <= FAR_EDGES * sizes
+            near |= np.linalg.norm(centers - center, axis=1) - radius <= reaches
         return near
 
     def forces(self, positions: np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -87,22 +88,26 @@ def element_forces(values: Values, positions: np.ndarray, sources: Sources) -> I
     positions: (n_v, 3) m.
     """
     for elements in _magnetized_elements(values, positions):
-        near = np.flatnonzero(sources.are_near(elements.centers, elements.sizes))
-        if not len(near) or not elements.magnetization.any():
+        near = sources.are_near(elements.centers, FAR_EDGES_OF_MORE_POINTS * elements.sizes)
+        middling = np.zeros_like(near)
+        if elements.have_one_point:
+            middling = ~near & sources.are_near(elements.centers, FAR_EDGES * elements.sizes)
+        if not (near.any() or middling.any()) or not elements.magnetization.any():
             continue
-        count = len(elements.magnetization)
+        count, fine = len(elements.magnetization), elements.fine
         taken, couples = np.empty((count, 3)), np.empty((count, 3))
-        is_near = np.isin(np.arange(count), near)
-        parts: list[tuple[np.ndarray, Rule, Rule]] = [
-            (~elements.fine, "own", "fine"),
-            (elements.fine, "fine", "finer"),
-        ]
-        for part, taking, _ in parts:
+        takings: list[tuple[np.ndarray, Rule]] = [(~fine, "own"), (fine, "fine")]
+        for part, taking in takings:
             for chunk in _chunks(np.flatnonzero(part)):
                 taken[chunk], couples[chunk] = sources.forces(*elements.moments(chunk, taking))
         mean = taken.copy()
-        for part, _, reference in parts:
-            for chunk in _chunks(np.flatnonzero(part & is_near)):
+        references: list[tuple[np.ndarray, Rule]] = [
+            (~fine & near, "fine"),
+            (~fine & middling, "four"),
+            (fine & (near | middling), "finer"),
+        ]
+        for part, reference in references:
+            for chunk in _chunks(np.flatnonzero(part)):
                 mean[chunk], _ = sources.forces(*elements.moments(chunk, reference))
         yield ElementForces(elements.body, elements.label, elements.fine, taken, mean, couples)
 
@@ -125,6 +130,8 @@ def _samples_by_elements(body: Any) -> bool:
 
 
 def _chunks(numbers: np.ndarray) -> list[np.ndarray]:
+    if not len(numbers):
+        return []
     return np.split(numbers, range(_TOGETHER, len(numbers), _TOGETHER))
 
 
@@ -153,16 +160,25 @@ class _Elements(ABC):
         self.centers: np.ndarray = now.mean(axis=1)
         self.sizes: np.ndarray = 2.0 * np.linalg.norm(now - self.centers[:, None], axis=2).max(axis=1)
 
+    @property
+    def have_one_point(self) -> bool:
+        """Whether an element's own point is its center."""
+        return False
+
     @abstractmethod
     def moments(self, which: np.ndarray, rule: Rule) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (n, p, 3) m of a rule in some elements, and the magnetic moments there, A m2."""
 
 
 class _Tetrahedra(_Elements):
+    @property
+    def have_one_point(self) -> bool:
+        return self.rest.shape[1] == 4
+
     def moments(self, which: np.ndarray, rule: Rule) -> tuple[np.ndarray, np.ndarray]:
         rest, now, m = self.rest[which], self.now[which], self.magnetization[which]
         order = 1 if rest.shape[1] == 4 else 2
-        at, weights = tetrahedron_rule(_PER_EDGE.get(rule), order)
+        at, weights = tetrahedron_rule("four" if rule == "own" and order == 2 else rule)
         values, slopes = (at, _LINEAR[None].repeat(len(at), 0)) if order == 1 else ten_node_shapes(at)
         at_rest = np.einsum("pka,nki->npia", slopes, rest)
         deformation = np.einsum("pka,nki->npia", slopes, now) @ np.linalg.inv(at_rest)

@@ -33,18 +33,18 @@ from .magnetization import magnetized_bodies
 if TYPE_CHECKING:
     from .values import Values
 
-# [-] Largest error of a body's magnetic force that is accepted; fixed by
-# test_faces_sample_finely_where_the_force_is_off_by_more_than_1_percent
-TRUSTED = 0.01
-# [-] The same of a six-node shell or a solid, whose errors are computed whatever they are; fixed by
+# [-] Error of a body's magnetic force above which faces and elements sample the field finely; fixed by
+# test_the_force_of_a_magnet_is_right_to_0_1_percent_at_every_distance and
 # test_the_force_of_a_near_magnet_on_elements_is_right_to_0_1_percent
-TRUSTED_OF_ELEMENTS = 0.001
+LARGEST_COARSE = 0.001
+# [-] Error above which a warning is given
+TRUSTED = 0.01
 # [-] Smallest reference for the error, as a fraction of the sum of the forces' magnitudes: where forces cancel, the
 # resultant is too small to refer to.
 CANCELLING = 0.1
-# [-] Estimate of the core above which the error is computed. It is 0.6 to 1.2 times the error where that is about 1 %, and
+# [-] Estimate of the core above which the error is computed. It is 0.6 to 1.2 times the error where that is 0.1 to 3 %, and
 # a quarter of it or more on meshes far too coarse; see test_the_estimate_of_the_core_is_0_6_to_1_2_times_the_error.
-_SUSPECT = 0.35 * TRUSTED
+_SUSPECT = 0.35 * LARGEST_COARSE
 _ON_SURFACE = 1e-9  # [-] distance from a magnet's surface, over the extent, within which a vertex is on it
 _MOST_NAMED = 4  # faces in a warning
 _TOGETHER = 2048  # faces whose samples are in memory at the same time

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .values import Values
 
 
-_COINCIDE = 1e-9  # [-] distance of two points, over the extent, below which they coincide
+COINCIDE = 1e-9  # [-] distance of two points, over the extent, below which they coincide
 
 
 class GapError(NamedTuple):
@@ -82,14 +82,19 @@ def _ratio(off: Any, reference: float) -> float:
     return error if np.isfinite(error) else np.inf
 
 
+def are_sources_together(values: Values, state: np.ndarray) -> bool:
+    """Return whether points of two sources of the own field coincide that are of different bodies, or were apart at rest."""
+    with values.in_core():
+        found = values.scene._model.own_field_gap_forces(state)
+    gaps = np.concatenate([found[4], found[7]])
+    return bool(gaps.min(initial=np.inf) < COINCIDE * values.scene._bodies.extent)
+
+
 def describe_coincident_points(values: Values, state: np.ndarray) -> str:
     """Return a sentence for an error message if points of two bodies with an own field coincide, else ""."""
-    scene = values.scene
-    if scene.own_field is None or not np.isfinite(state).all():
+    if values.scene.own_field is None or not np.isfinite(state).all():
         return ""
-    with values.in_core():
-        gaps = scene._model.own_field_gap_forces(state)[4]
-    if not min(gaps, default=np.inf) < _COINCIDE * scene._bodies.extent:
+    if not are_sources_together(values, state):
         return ""
     return (
         "Bodies with an own field touch: points of their sources coincide, where forces are infinite. Leave a gap of a part "

@@ -9,6 +9,7 @@ import numpy as np
 from ... import _core
 from ..._input.selections import indices
 from ...errors import NoGradient
+from ...mesh.mesh_base import width_of
 from ...mesh.rest_shape import (
     by_continuations,
     by_edge_vectors,
@@ -19,7 +20,6 @@ from ...mesh.rest_shape import (
 )
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ..actuators.tendon import Tendon
-from ..contact.body_contact import width_of
 from ..loads.foundation import ElasticFoundation
 from ..loads.loads import AreaLoad, EdgeCouple, EdgeLoad
 from ..loads.spring import Spring

@@ -229,7 +229,6 @@ class Scene(PlotMixin):
         self._constraints, self._moment_edges = constraints, edges
         self._warned_of_obtuse_faces = False
         self._warned_of_strain = 0.0
-        self._warned_of_steps = 0.0
         self._warned_of_dear_steps = False
         self._warned_of_jumps = False
         self._warned_of_gains = False

@@ -47,6 +47,13 @@ class Growth:
         """
         label, n = f"{name} [{UNITS[name]}]", len(self._axes)
         array = real_numbers(label, given)
+        if before is not None and array.shape not in (before.shape, before.shape[1:]):
+            in_time = ", ".join(map(str, ("steps + 1", *before.shape)))
+            raise ValueError(
+                f"{label} was made with shape {before.shape} and keeps it, over the time of a motion ({in_time}), got "
+                f"{array.shape}: where faces are to have their own later, or directions, give them in the scene, "
+                f"np.ones({n}) will do"
+            )
         if array.shape not in ((), (n,), (3, 3), (n, 3, 3)):
             raise ValueError(
                 f"{label} must be a number or have shape ({self._rows},) = ({n},), or (3, 3) or ({self._rows}, 3, 3) = "
@@ -56,11 +63,6 @@ class Growth:
         self.check(name, array[None])
         if before is None or array.shape == before.shape:
             return array
-        if array.shape != before.shape[1:]:
-            raise ValueError(
-                f"{label} was made with shape {before.shape} and keeps it, got {array.shape}: where faces are to have "
-                "their own later, or directions, give them in the scene, np.ones will do"
-            )
         return np.broadcast_to(array, before.shape)
 
     def check(self, name: str, rows: np.ndarray) -> None:

@@ -132,7 +132,7 @@ def free_rigid_motions(
 
     on_joints: vertices fixed to links of skeletons; their components are left out, because joints may hold them.
     """
-    found, mesh, size = [], bodies.mesh, bodies.size
+    found, mesh, size = [], bodies.mesh, bodies.extent
     components = bodies.components
     for parts in _tied_parts(components, constraints.equations):
         members = [np.flatnonzero(components == part) for part in parts]
@@ -165,7 +165,7 @@ def _prevented_by_ties(
     bodies: Bodies, equations: Sequence[Equations], parts: list[int], centers: list[np.ndarray]
 ) -> list[np.ndarray]:
     """Return the combinations of rigid motions of these parts that equations prevent, rows (k, 6 len(parts))."""
-    found, mesh, size = [], bodies.mesh, bodies.size
+    found, mesh, size = [], bodies.mesh, bodies.extent
     place = np.full(bodies.components.max(initial=-1) + 1, -1)
     place[parts] = np.arange(len(parts))
     for each in equations:
@@ -255,7 +255,7 @@ def _check_agree(bodies, vertex: int, constraints: list[VertexConstraint]) -> No
             apart = positions(a.move) - positions(b.move)
             if a.move is None or b.move is None:
                 still = a if a.move is None else b
-                if np.abs(apart @ still.along.T).max() > 1e-9 * bodies.size:
+                if np.abs(apart @ still.along.T).max() > 1e-9 * bodies.extent:
                     raise ValueError(
                         f"one support holds vertex {vertex} along a direction in which another moves it"
                     )
@@ -265,7 +265,7 @@ def _check_agree(bodies, vertex: int, constraints: list[VertexConstraint]) -> No
                 continue
             both = np.concatenate([a.along[shared.any(axis=1)], b.along[shared.any(axis=0)]])
             turned = not np.allclose(a.move.rotation, b.move.rotation)
-            if turned or np.abs(apart @ both.T).max() > 1e-12 * bodies.size:
+            if turned or np.abs(apart @ both.T).max() > 1e-12 * bodies.extent:
                 raise ValueError(f"two supports move vertex {vertex} to different places")
 
 
@@ -343,7 +343,7 @@ def _directed_edges(directed: list[tuple[object, DirectedEdges]], moves: list[Ri
 
 def _prevented(bodies, constraints: Constraints, in_part: np.ndarray, center: np.ndarray) -> np.ndarray:
     """Return the infinitesimal rigid motions that supports prevent, rows (k, 6): translation, size-scaled rotation."""
-    rows, mesh, size = [np.zeros((1, 6))], bodies.mesh, bodies.size
+    rows, mesh, size = [np.zeros((1, 6))], bodies.mesh, bodies.extent
     for (node, count, *_), frame in zip(constraints.held_nodes, constraints.held_frames, strict=True):
         if node < mesh.n_vertices and in_part[node]:
             along = frame[:, :count].T

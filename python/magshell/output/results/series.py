@@ -20,7 +20,7 @@ from ..._input.tensors import detached
 from ..._runtime.files import replace_file, replacing
 from ..._runtime.progress import SolveBar
 from ...mesh.io.read_write import check_field_name, write_cells, write_mesh
-from ...mesh.io.tetrahedra import cells_and_data
+from ...mesh.io.tetrahedra import cells_of
 from ...mesh.tetrahedra.tet_mesh import TetMesh
 from ...mesh.triangles.six_node_mesh import QuadraticTriangleMesh
 from ...mesh.triangles.triangle_mesh import TriangleMesh
@@ -75,18 +75,18 @@ def write_solids(
         rows, solid = slice(face, face + mesh.n_faces), isinstance(mesh, TetMesh)
         own = element_fields(elements[face]) if face in elements else {}
         if solid:
-            (kind, tetrahedra), *_ = cells_and_data(mesh, {})[0]
+            ((kind, tetrahedra),) = cells_of(mesh)
             cells.append((kind, tetrahedra + vertex))
             inside = slice(tetrahedron, tetrahedron + mesh.n_tetrahedra)
             given = {name: values[inside] for name, values in on_tetrahedra.items()}
-            data.append({"part": mesh.parts.astype(float), **own, **given})
+            data.append({"part": mesh.parts, **own, **given})
             tetrahedron = inside.stop
         if not solid or on_faces or magnetization[rows].any():
             cells.append(("triangle", mesh.faces + vertex))
             given = {name: values[rows] for name, values in on_faces.items()}
             data.append({"magnetization": magnetization[rows], **({} if solid else own), **given})
         vertex, face = vertex + mesh.n_vertices, face + mesh.n_faces
-    missing = {"magnetization": 0.0} if state.is_magnetized else {}
+    missing: dict[str, float] = {"magnetization": 0.0, "part": -1}
     shapes = {name: values.shape[1:] for each in data for name, values in each.items()}
     if not any(mesh.parts.any() for mesh in meshes if isinstance(mesh, TetMesh)):
         del shapes["part"]

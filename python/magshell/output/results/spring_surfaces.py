@@ -83,14 +83,14 @@ def _bed(scene, bed: ElasticFoundation) -> tuple[np.ndarray, np.ndarray]:
         if not isinstance(bed.direction, np.ndarray)
         else np.broadcast_to(bed.direction, normals.shape)
     )
-    ground = points - _BED * scene._bodies.size * down
+    ground = points - _BED * scene._bodies.extent * down
     of_scene = np.arange(scene._bodies.n_vertices)[span.vertices][vertices]
     return of_scene[some], np.stack([ground, points], axis=1)[some]
 
 
 def _coils(scene, springs: Any, ends: np.ndarray) -> Surface:
     """Return coils between ends (n, 2, 3) m, with a block at each end that is fixed to the ground."""
-    radius = _COIL * scene._bodies.size
+    radius = _COIL * scene._bodies.extent
     if isinstance(springs, Spring) and springs._is_axial:
         at_rest = np.linalg.norm(np.diff(springs.points, axis=1)[:, 0], axis=1)
         radius = min(radius, _SLENDER * float(at_rest.min()))

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..._input.tensors import detached
 from ...model.fields.field import UniformField
+from ...model.results.solid_result import largest_green_strains
 from ...solve.dynamics.trajectory import Trajectory
 from ...solve.statics.equilibria import EquilibriumSet
 from ...solve.statics.equilibrium import Equilibrium
@@ -32,7 +33,8 @@ def to_xarray(
 
     The states lie along the coordinate `time` [s] of a Trajectory, `parameter` of an EquilibriumPath or `case` of an
     EquilibriumSet. The variables are `positions`, `displacements` and, of a motion, `velocities`, (..., vertex, axis); the
-    energies, one variable per term, and `kinetic_energy`; the largest strains; `applied_flux_density` (..., axis);
+    energies, one variable per term, and `kinetic_energy`; the largest strains, of shells the membrane and bending strain, of
+    solids the principal Green strain; `applied_flux_density` (..., axis);
     `rest_positions` (vertex, axis) and `faces` (face, corner). Each ms.Probe in `probes` adds its columns. Units are in
     `attrs["units"]`. Tensors become arrays.
 
@@ -174,9 +176,12 @@ def _own_columns(result) -> dict[str, tuple[str, np.ndarray]]:
         found["load_factor"] = ("1", np.asarray(result._load_factors))
     if any(not isinstance(each, UniformField) for each in result.scene.fields):
         found["field_factor"] = ("1", field_factors(result))
-    strains = result._largest_strains
-    for kind in ("membrane", "bending"):
-        found[f"largest_{kind}_strain"] = ("1", np.asarray(getattr(strains, kind)))
+    if result.scene._bodies.shells:
+        strains = result._largest_strains
+        for kind in ("membrane", "bending"):
+            found[f"largest_{kind}_strain"] = ("1", np.asarray(getattr(strains, kind)))
+    if result.scene._bodies.solids:
+        found["largest_green_strain"] = ("1", largest_green_strains(result))
     return found
 
 

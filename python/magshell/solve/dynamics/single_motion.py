@@ -168,7 +168,7 @@ def run(
     watch = stop_at_once if motion_inputs.interrupted else Watch(progress, note)
     along = None if isinstance(time_step, Adaptive) else _requested_tangents(motion_inputs)
     known = None
-    check_magnets_apart(scene, scene._model.positions(motion_inputs.start.state))
+    check_magnets_apart(motion_inputs.inputs.values, motion_inputs.start.state)
     with motion_inputs.inputs.in_core():
         check_apart(scene, motion_inputs.start.state)
         if along is None:

@@ -10,6 +10,7 @@ import numpy as np
 from ..._runtime.frozen import remember
 from ..._runtime.warning_stacklevel import callers_level
 from ...errors import StepErrorWarning
+from ...model.scene.extent import extent_of
 from ..options import Adaptive
 
 if TYPE_CHECKING:
@@ -24,17 +25,6 @@ _FEWEST = 3  # steps with many factorizations: one or two may be an impact; see 
 _ROUND_OFF = (
     1e-10  # [-] of the largest coordinate or the extent; see test_tolerance_below_round_off_is_refused
 )
-
-
-def extent_of(scene: Scene) -> float:
-    """Return the longest side of a body's bounding box at rest [m].
-
-    Without shells and solids it is the diagonal of the box around the points of all rigid bodies.
-    """
-    if scene._bodies.extent > 0.0:
-        return scene._bodies.extent
-    points = scene._model.points(scene._model.rest_state())
-    return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def tolerance_of(scene: Scene, adaptive: Adaptive | None) -> float:
@@ -72,7 +62,8 @@ def describe_steps(move: Trajectory) -> str:
 def warn_of_steps(move: Trajectory) -> None:
     """Warn that errors of steps are large, or that many steps took many factorizations.
 
-    A scene warns of each once, and again whenever the largest error has doubled since.
+    Every motion with large errors warns: those of a coarse step do not cover those of a shorter one. A scene warns of many
+    factorizations once.
     """
     scene, errors = move.scene, move.step_errors
     extent = extent_of(scene)
@@ -83,8 +74,7 @@ def warn_of_steps(move: Trajectory) -> None:
     dear = np.flatnonzero(move._step_factorizations > MANY_FACTORIZATIONS)
     were_divided = len(errors) > move.steps  # by ms.Adaptive or by the caller
     is_dear = len(dear) >= _FEWEST and len(dear) > _OFTEN * len(errors) and not were_divided
-    badness, told = errors[worst] / limit, scene._warned_of_steps
-    is_wrong = badness >= max(1.0, 2.0 * told)
+    is_wrong = errors[worst] >= limit
     if not is_wrong and (not is_dear or scene._warned_of_dear_steps):
         return
     length = move.time_steps[worst]
@@ -106,9 +96,7 @@ def warn_of_steps(move: Trajectory) -> None:
     if were_divided:
         advice = f"Take a tolerance of at most {limit:.2g} m, or steps of {enough:g} s"
     warnings.warn(StepErrorWarning(f"the motion's {what}. {advice}.", move), stacklevel=callers_level())
-    if is_wrong:
-        remember(scene, _warned_of_steps=badness)
-    else:
+    if not is_wrong:
         remember(scene, _warned_of_dear_steps=True)
 
 

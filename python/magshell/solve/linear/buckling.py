@@ -237,8 +237,8 @@ def _differentiable(
 
 def _size(scene: Scene) -> float:
     """Return the size of the bodies of a scene, m; that of its links if there are no others."""
-    if scene._bodies.size > 0.0:
-        return scene._bodies.size
+    if scene._bodies.extent > 0.0:
+        return scene._bodies.extent
     return float(np.ptp(scene._model.points(scene._model.rest_state()), axis=0).max())
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...model.actuators.cavity import Cavity
 from ...model.bodies.bodies import called
 from ...model.fields.magnets import describe_magnet_overlap
 from ...model.results.crossings import describe_attraction
@@ -17,6 +18,7 @@ from .solve_log import SolveLog, SolveStep, steps_of
 if TYPE_CHECKING:
     from ... import _core
     from ...model.scene.solve_inputs import Inputs
+    from ...model.scene.values import Values
 
 # [-] Height of a face over the median edge length, below which round-off of its stiffness hides softer parts.
 SHORTEST_HEIGHT = 1e-4
@@ -76,10 +78,35 @@ def why_not(inputs: Inputs, found: _core.StaticsResult, at_rest: bool) -> str:
         fields = map(inputs.values.current, scene.fields)
         if inside := describe_magnet_overlap(fields, positions, scene.mesh.edge_lengths):
             return " ".join([*sentences, inside, kept])
+        if lid := _describe_lids(inputs):
+            sentences.append(lid)
         if touching := describe_coincident_points(inputs.values, failed.state):
             return " ".join([*sentences, touching, kept])
     advice = _advice(inputs, found, at_rest, near)
     return " ".join(filter(None, [*sentences, advice, describe_attraction(scene), kept]))
+
+
+def has_given_pressure(values: Values) -> bool:
+    """Return whether a cavity of the scene has a given pressure p: its energy -p V has no lower bound."""
+    return any(isinstance(each, Cavity) and each.law == "pressure" for each in values.scene.actuators)
+
+
+def _describe_lids(inputs: Inputs) -> str:
+    """Return a sentence on lids of cavities that hang on edges of solids that move; "" if there are none."""
+    scene = inputs.scene
+    cavities = [each for each in scene.actuators if isinstance(each, Cavity)]
+    rims = [each.rim_on_solids(scene._bodies) for each in cavities]
+    rim = np.unique(np.concatenate([np.zeros(0, dtype=int), *rims]))
+    held = scene._model.positions(scene._model.expand(np.ones(scene._model.free_size)))[rim] == 0.0
+    free = rim[~held.all(axis=1)]
+    if not len(free):
+        return ""
+    more = ", ..." if len(free) > _MOST_NAMED else ""
+    return (
+        f"The lid of a cavity (close_rims) hangs on edges of a solid, at vertices {_listed(free[:_MOST_NAMED])}{more}: its "
+        "pressure is a load on a line there, under which strains grow without limit where the mesh is refined. Hold the rim "
+        "by a support, or close the cavity by a body."
+    )
 
 
 def _seen(inputs, found) -> list[str]:
@@ -109,7 +136,9 @@ def _attempts(found, in_steps: bool, bodies) -> list[str]:
         taken, last = ("1 step", "it") if steps == 1 else (f"{steps} steps", "its last one")
         moved = f"; {last} still moved {called(bodies.listed)} by {found.failed.last_move:.2g} m"
         stood = " and came to a standstill"
-        told.append(f"Relaxation took {taken}{moved if _still_moves(found.failed, bodies.size) else stood}.")
+        told.append(
+            f"Relaxation took {taken}{moved if _still_moves(found.failed, bodies.extent) else stood}."
+        )
     return told
 
 
@@ -209,9 +238,15 @@ def _general_advice(inputs, found, at_rest: bool) -> str:
             "What presses a body onto an obstacle presses it through: take a larger contact_stiffness [N/m] of the Contact, "
             "move the obstacle less in a solve, or a thicker obstacle."
         )
+    steps = [step for step in steps_of(found) if step[1] == "load step"]
+    if at_rest and any(failure for *_, failure in steps) and has_given_pressure(inputs.values):
+        return (
+            "The stable equilibria on the way end, probably at a limit point, beyond which nothing near holds the pressure: "
+            "ms.follow_path, with the same arguments, follows them to it and past it."
+        )
     if found.effort_spent and at_rest:
         return "Start from a nearby equilibrium, or allow it more (max_factorizations of the solver)."
-    if _still_moves(found.failed, scene._bodies.size):
+    if _still_moves(found.failed, scene._bodies.extent):
         return "Allow it more steps (max_relaxation_steps of the solver), or start from a nearby equilibrium."
     if not at_rest:
         return "Start from positions closer to an equilibrium."

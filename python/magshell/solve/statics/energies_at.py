@@ -16,6 +16,8 @@ from ..._runtime.solver_entry_point import solve_entry
 from ...errors import NoGradient
 from ...model.bodies.bodies import checked_body
 from ...model.scene.fine_faces import with_fine_faces
+from ...model.scene.own_field_errors import gap_errors, warn_of_gaps
+from ...model.scene.own_field_overlap import describe_overlap
 from ...model.scene.scene import Scene
 from ...model.shells.shell import Shell
 from ...model.solids.solid import Solid
@@ -70,7 +72,8 @@ def energies(
     of one body (ValueError) and of elements (NoGradient) have no derivatives.
 
     Raises ValueError on bad input, and where the energy is not defined: bodies in contact intersect or are nearer than
-    allowed, or elements are turned inside out whose material does not allow it.
+    allowed, elements are turned inside out whose material does not allow it, edges of bodies with an own field coincide, or
+    it is not finite. ms.FieldSamplingWarning tells where such bodies are too near each other for their meshes.
 
     >>> import magshell as ms
     >>> mesh = ms.meshes.rectangle(0.1, 0.02, cells=(10, 2))
@@ -88,11 +91,14 @@ def energies(
     if chosen is not None:
         if leaves:
             raise NoGradient(f"energies by {by} have no gradients: give tensors detached")
-        return _of_elements(at.adjoint, *chosen)
+        found = _of_elements(at.adjoint, *chosen)
+        at.check_finite(*found.values())
+        return found
     if number is not None and leaves:
         raise ValueError("energies of one body have no gradients: give tensors detached, or no body")
     with at.adjoint.inputs.in_core():
         found = at.adjoint.by_name() if number is None else _of_body(scene, number, at.adjoint.of_terms())
+    at.check_finite(*found.values())
     if not leaves:
         return found
     from ..adjoint.energy_autograd import energies_of
@@ -149,6 +155,7 @@ def energy(
     inputs = at.adjoint.inputs
     with inputs.in_core():
         found = at.adjoint.by_name()
+    at.check_finite(*found.values())
     if not inputs.leaves:
         return sum(found.values())
     from ..adjoint.energy_autograd import energies_of
@@ -201,6 +208,7 @@ def forces(
     arguments = given_to("forces", locals())
     at = _point("forces", scene, positions, edge_rotations, arguments)
     inputs = at.adjoint.inputs
+    at.check_finite(*at.adjoint.by_unknowns)
     if not inputs.leaves:
         return Forces(*(like(-each, *inputs.given) for each in at.adjoint.by_unknowns))
     from ..adjoint.energy_autograd import gradient_of
@@ -256,6 +264,7 @@ def hessian(
     if at.adjoint.inputs.leaves:
         raise ValueError("a Hessian has no gradients: give tensors detached")
     order = at.adjoint.unknowns
+    at.check_finite(at.adjoint.hessian.data)
     whole = scipy.sparse.csr_array(order.to_core.T @ at.adjoint.hessian @ order.to_core)
     if not reduced:
         return whole
@@ -322,6 +331,16 @@ class _Point(NamedTuple):
     adjoint: EnergyAdjoint
     dtype: Any
 
+    def check_finite(self, *found: Any) -> None:
+        """Raise ValueError unless all of these energies, forces or second derivatives are finite."""
+        if all(np.isfinite(each).all() for each in found):
+            return
+        inputs = self.adjoint.inputs
+        with inputs.in_core():
+            state = self.adjoint.state(inputs.load_parameters)
+            reason = inputs.scene._model.not_finite(state, inputs.load_parameters)
+        raise ValueError(f"there is no energy at these positions: {reason or 'it is not finite'}")
+
 
 def _number(scene: Scene, body: Shell | Solid) -> int:
     if not isinstance(scene, Scene):
@@ -347,6 +366,9 @@ def _point(function: str, scene: Scene, positions, edge_rotations, arguments: di
         adjoint = EnergyAdjoint(function, inputs, state)
         if reason := model.refusal(adjoint.state(inputs.load_parameters)):
             raise ValueError(f"there is no energy at these positions: {reason}")
+    if reason := describe_overlap(inputs.values, state):
+        raise ValueError(f"there is no energy at these positions: {reason}")
+    warn_of_gaps(gap_errors(inputs.values, state), "these positions")
     return _Point(adjoint, dtype_like(*inputs.given) if inputs.leaves else None)
 
 

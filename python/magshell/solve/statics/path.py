@@ -36,6 +36,7 @@ from ...model.scene.field_sampling import (
 )
 from ...model.scene.fine_faces import keeping_fine_faces, with_fine_faces
 from ...model.scene.own_field_errors import gap_errors, warn_of_gaps
+from ...model.scene.own_field_overlap import check_magnets_apart
 from ...model.scene.reshaped import reshaped
 from ...model.scene.scene import Scene
 from ...model.scene.solve_inputs import Inputs, plain_inputs
@@ -376,6 +377,7 @@ def follow_path(
     if start is not None:
         inputs = keeping_fine_faces(inputs, start._values)
     state, angle_branches, from_, _ = starting_point(scene, start, inputs)
+    check_magnets_apart(inputs.values, state)
     interrupted = False
     if start is None:  # a given equilibrium keeps its fine faces: with others it would not be in equilibrium
         try:  # Ctrl-C may arrive in a field that is a Python function of the caller
