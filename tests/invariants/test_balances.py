@@ -22,7 +22,6 @@ NOT_HELD = {
         "energy",
         "on_springs",
     ): "a free rigid body leaves 1e-6 of what moved, which falls slower than the second order",
-    ("energy", "with_added_mass"): "added mass has no energy (DESIGN 2.19)",
 }
 
 

@@ -2,7 +2,7 @@
 // and loads per length or area follow X besides: the caller adds these.
 //
 // A homogeneous deformation I + H of the rest shape at a point of an element, H = sum_k dX_k (x) g_k with the gradients g_k of the shape
-// functions, changes lambda . g by B : H, so that d(lambda . g)/dX_k = sum over points B g_k (terms/solid/tetrahedra_rest.h,
+// functions, changes lambda . g by B : H, so that d(lambda . g)/dX_k = sum over points B g_k (terms/solid/tetrahedra.h,
 // energy/rest_corners.h).
 #pragma once
 

@@ -14,7 +14,7 @@ namespace {
 // Computes the measures inside the faces of a SIMD vector at one point after another, by a function of the point and the measures there with
 // 1/J = 1.
 template <class OfPoint>
-void each_point(const BendingSix& shape, const BendingSix::Element& element, const OfPoint& of_point) {
+void each_point(const BendingSix::Element& element, const OfPoint& of_point) {
     BendingSix::Element unit = element;
     for (SimdDouble& each : unit.inverse_jacobian) each = SimdDouble(0.0);
     for (int point = 0; point < BendingSix::points; ++point) {
@@ -96,7 +96,7 @@ void BendingSixTerm::add_grown_strains_by_rest(Index group, const BendingSix& no
                                                GrownSixRest* const of_faces[SimdDouble::width],
                                                VectorXd& out) const {
     const BendingSix::Element& element = elements_[group];
-    each_point(now, element, [&](int point, const BendingSix::Element& unit) {
+    each_point(element, [&](int point, const BendingSix::Element& unit) {
         SimdDouble here[9];
         now.measures(unit, here);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
@@ -129,7 +129,7 @@ void BendingSixTerm::add_grown_strains_by_rest(Index group, const BendingSix& no
     at_rest.rows(reference, rows);
     rows.forces(by_reference, by_node);
     ByRestFace found[SimdDouble::width];
-    each_point(at_rest, reference, [&](int point, const BendingSix::Element& unit) {
+    each_point(reference, [&](int point, const BendingSix::Element& unit) {
         SimdDouble there[9];
         at_rest.measures(unit, there);
         for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
@@ -181,7 +181,7 @@ void BendingSixTerm::add_grown_rest_vjp(const double* q, const double* lambda, V
             for (int r = 0; r < 9; ++r) by_angles.set(f, r, by_angle[r]);
         }
         // The rates inside the face depend on 1/J' and s' as the strains do.
-        each_point(now, elements_[group], [&](int point, const BendingSix::Element& unit) {
+        each_point(elements_[group], [&](int point, const BendingSix::Element& unit) {
             now.rows(unit, rows);
             rows.along(p, inside);
             for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {

@@ -26,13 +26,13 @@ bool LameModuli::set_values(const Values& values) {
     return true;
 }
 
-void LameModuli::constants(Index element, double out[2]) const {
+void LameModuli::constants(Index element, double out[]) const {
     const auto [young, nu] = of_elements_[element];
     out[0] = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
     out[1] = 0.5 * young / (1.0 + nu);
 }
 
-void LameModuli::add_vjp(Index element, const double by[2], Gradient& out) const {
+void LameModuli::add_vjp(Index element, const double by[], Gradient& out) const {
     const auto [young, nu] = of_elements_[element];
     double c[2];
     constants(element, c);

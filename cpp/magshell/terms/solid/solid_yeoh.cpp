@@ -2,7 +2,8 @@
 //
 //   W = C10 x + C20 x^2 + C30 x^3 + K/2 (J - 1)^2,   x = J^(-2/3) I1 - 3          [J/m3]
 //
-// The last summand may be evaluated at the mean J of an element. Flat and inverted elements have no energy.
+// The last summand may be evaluated at the mean J of an element. Flat and inverted elements have no energy. With C10 = mu/2,
+// C20 = C30 = 0 and K = lam + 2/3 mu it is the neo-Hookean law whose resistance to shear does not depend on the volume.
 #include "magshell/energy/isochoric_solid.h"
 #include "magshell/terms/solid/tetrahedra_term.h"
 
@@ -36,10 +37,36 @@ struct Yeoh : IsochoricSolid<Yeoh, 4> {
     }
 };
 
+/// The constants of the neo-Hookean case, by Young's modulus and Poisson's ratio.
+class NeoHookeanModuli final : public SolidModuli {
+  public:
+    explicit NeoHookeanModuli(const SolidTermInput& input) : lame_(input) {}
+
+    bool set_values(const Values& values) override { return lame_.set_values(values); }
+    void constants(Index element, double out[]) const override {
+        double lame[2];
+        lame_.constants(element, lame);
+        const auto [lambda, mu] = lame;
+        out[0] = 0.5 * mu;
+        out[1] = out[2] = 0.0;
+        out[3] = lambda + 2.0 / 3.0 * mu;
+    }
+    void add_vjp(Index element, const double by[], Gradient& out) const override {
+        const double by_lame[] = {by[3], 0.5 * by[0] + 2.0 / 3.0 * by[3]};
+        lame_.add_vjp(element, by_lame, out);
+    }
+    double size(Index element) const override { return lame_.size(element); }
+
+  private:
+    LameModuli lame_;
+};
+
 }  // namespace
 
 SolidMaterials yeoh_materials() {
-    return isochoric_entries<Yeoh>("Yeoh");
+    SolidMaterials all = isochoric_entries<Yeoh>("Yeoh");
+    all.emplace_back("NeoHookean isochoric", &make_tetrahedra_term<InvariantSolid<Yeoh>, NeoHookeanModuli>);
+    return all;
 }
 
 }  // namespace magshell

@@ -10,70 +10,81 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
-#include <optional>
+#include <memory>
+#include <string>
+#include <utility>
 
 #include "magshell/assembly/element_blocks.h"
-#include "magshell/terms/rest_shape_term.h"
+#include "magshell/terms/solid/solid_moduli.h"
 #include "magshell/terms/solid/tetrahedra.h"
 
 namespace magshell {
 
-// ViscousStrain: strains and stresses of a solid's linear viscosity at a point, with the moduli of the
-// reference configuration.
-//
-//   d = (E_00 E_11 E_22 2 E_12 2 E_02 2 E_01),   s_ii = 2 mu d_i + lam tr E,   s_ij = mu d_k
-//
-// so that s . d = S : E.
-struct ViscousStrain {
-    static constexpr int size = 6;
+/// Returns dP/dF : L of a material from its tangent, whose blocks are taken for unit vectors as gradients.
+template <class Tangent>
+SimdMat3 tangent_along(const Tangent& tangent, const SimdMat3& l) {
+    const auto column = [](const SimdMat3& a, int k) { return SimdVec3{a.at[k], a.at[3 + k], a.at[6 + k]}; };
+    SimdVec3 sum[3] = {broadcast(Vec3::Zero()), broadcast(Vec3::Zero()), broadcast(Vec3::Zero())};
+    for (int k = 0; k < 3; ++k)
+        for (int i = 0; i <= k; ++i) {
+            const SimdMat3 block = tangent.block(k + 1, i + 1);
+            sum[k] += multiply(block, column(l, i));
+            if (i < k) sum[i] += multiply(transpose(block), column(l, k));
+        }
+    return {{sum[0].x, sum[1].x, sum[2].x, sum[0].y, sum[1].y, sum[2].y, sum[0].z, sum[1].z, sum[2].z}};
+}
 
-    static void at(const SimdMat3& f, SimdDouble d[size]) {
-        Green::strain(f, d);
-        for (int i = 3; i < size; ++i) d[i] += d[i];
-    }
-    static void rate(const SimdMat3& f, const SimdMat3& along, SimdDouble d[size]) {
-        Green::rate(f, along, d);
-        for (int i = 3; i < size; ++i) d[i] += d[i];
-    }
-    static void stress(const RestModuli& moduli, const SimdDouble d[size], SimdDouble s[size]) {
-        const SimdDouble pressure = moduli.lambda * (d[0] + d[1] + d[2]);
-        for (int i = 0; i < 3; ++i) s[i] = SimdDouble(2.0) * moduli.mu * d[i] + pressure;
-        for (int i = 3; i < size; ++i) s[i] = moduli.mu * d[i];
-    }
-    /// Returns the derivatives of stress(d) . rate by the moduli.
-    static RestModuli work_by_moduli(const SimdDouble d[size], const SimdDouble rate[size]) {
-        RestModuli by{(d[0] + d[1] + d[2]) * (rate[0] + rate[1] + rate[2]), SimdDouble(0.0)};
-        for (int i = 0; i < 3; ++i) by.mu += SimdDouble(2.0) * d[i] * rate[i];
-        for (int i = 3; i < size; ++i) by.mu += d[i] * rate[i];
-        return by;
-    }
-};
+/// Returns vectors for which the blocks of a tangent of four nodes are the derivatives dP/dF.
+inline std::array<SimdVec3, 4> unit_gradients() {
+    const SimdDouble zero(0.0), one(1.0);
+    const SimdVec3 x{one, zero, zero}, y{zero, one, zero}, z{zero, zero, one};
+    return {-(x + y + z), x, y, z};
+}
 
-template <class Element, class Material, class Moduli>
-class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli>, public RestShapeTerm {
-    using Base = Tetrahedra<Element, Material, Moduli>;
-    using Base::N, Base::points, Base::n_constants, Base::may_average, Base::loop_, Base::rest_,
-        Base::constants_, Base::mean, Base::gradient_of, Base::add_pull;
-    using typename Base::State;
-    static constexpr int stresses_ = Material::stresses;
+template <class Element, class Material>
+class TetrahedraTerm final : public Tetrahedra<Element> {
+    using Base = Tetrahedra<Element>;
+    using Base::N, Base::points, Base::loop_, Base::rest_, Base::frozen_, Base::state_, Base::mean,
+        Base::gradient_of, Base::add_pull;
+    using typename Base::Rates;
+    static constexpr int stresses_ = Material::stresses, n_constants = Material::constants;
     // Stored per point: its stresses, or its measures at the end of a linearized step.
     static constexpr bool measures_ = Material::stored_measures > 0;
     static constexpr int kept_ = measures_ ? Material::stored_measures : stresses_;
+    // Whether there is a mean of several points, and a part of the energy that can act on it.
+    static constexpr bool may_average =
+        points > 1 && requires(const Material& at, const SimdVec3& g) { at.volume_gradient(g); };
 
   public:
-    TetrahedraTerm(const SolidTermInput& input,
-                   const std::vector<std::array<Index, Element::nodes>>& element_nodes)
+    TetrahedraTerm(const SolidTermInput& input, const typename Base::ElementNodes& element_nodes,
+                   std::unique_ptr<SolidModuli> moduli)
         : Base(input, element_nodes),
           n_nodes_(input.nodes.n_nodes()),
+          moduli_(std::move(moduli)),
+          constants_(loop_.groups()),
           stress_(measures_ ? 0 : input.solid.n_elements(), points * kept_),
           extrapolated_(input.solid.n_elements(), points * kept_) {}
 
-    int strains_per_element() const override { return ViscousStrain::size * points; }
+    bool set_values(const Values& values) override {
+        if (!moduli_->set_values(values)) return false;
+        double c[n_constants];
+        for (Index group = 0; group < loop_.groups(); ++group)
+            for (int lane = 0; lane < SimdDouble::width; ++lane) {
+                moduli_->constants(loop_.element(group, lane), c);
+                for (int k = 0; k < n_constants; ++k) constants_[group].at[k].set(lane, c[k]);
+            }
+        return true;
+    }
+
+    Capabilities capabilities() const override {
+        return {.has_infeasible_states = Material::refuses_inversion,
+                .has_transient_instability = true,
+                .has_transient_stresses = true};
+    }
 
     void evaluate(const double* q, const LoadParameters&, Residual& out) override {
         state_.assign(q, q + 3 * n_nodes_);
-        if (frozen_) return add_forces(*frozen_, out);
+        if (frozen_) return this->add_forces(*frozen_, out);
         if (this->history_.shift) viscous_.resize(this->elements(), points);
         // All calls are inlined: passing SIMD vectors between functions through memory takes a third of the time.
         loop_.scatter_groups([&](Index group) __attribute__((flatten)) {
@@ -97,7 +108,7 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli>, publi
 
     void assemble(const ElementBlock& element_block, const double* q, const LoadParameters&,
                   bool extrapolated_stress, SystemMatrix& out) const override {
-        if (frozen_) return assemble_frozen(element_block, out);
+        if (frozen_) return this->assemble_frozen(element_block, out);
         const Strains& stress = extrapolated_stress ? extrapolated_ : stress_;
         const Strains& viscous = extrapolated_stress ? viscous_.extrapolated : viscous_.own;
         ElementLoop<N>::over_groups(element_block, [&](Index group) __attribute__((flatten)) {
@@ -175,89 +186,75 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli>, publi
         });
     }
 
-    void vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) override {
-        if (!frozen_) add_work_vjp(q, along_motion(lambda), out);
-    }
-
-    void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override {
-        if (!frozen_) add_work_rest_vjp(q, along_motion(lambda), out);
-    }
-
-    // With Green's strain E, d2E is the same at all states. So the Hessian of held stresses V S' has no derivative, and that of
-    // W = sum_p V S : c is one of the power P : L for the rates L = F^-T c, whose strain rate is c.
-    void freeze_stress_rates(const double* p) override;
-    void release_stresses() override { frozen_.reset(); }
-    bool has_stress_work_vjp() const override { return true; }
-    void add_stress_work_vjp(const double* q, const Strains& curvatures, Residual& by_q, Gradient& out,
-                             VectorXd* by_rest) override;
-
-    void add_rest_strains_vjp(const Strains& stresses, VectorXd& out) const override {
-        add_rest(out, [&](Index group, SimdMat3 by_deformation[points]) {
-            SimdVec3 x[N];
-            loop_.gather(group, state_.data(), x);
-            for (int p = 0; p < points; ++p) {
-                const SimdMat3 f = gradient_of(group, p, x);
-                by_deformation[p] =
-                    -multiply(transposed_times(f, f), Green::matrix(stresses.at(group) + 6 * p));
-            }
-        });
-    }
-
-    Strains strains(const double* q) override {
-        Strains out(this->elements(), 6 * points);
-        loop_.each_group([&](Index group) {
-            SimdVec3 x[N];
-            loop_.gather(group, q, x);
-            for (int p = 0; p < points; ++p)
-                ViscousStrain::at(gradient_of(group, p, x), out.at(group) + 6 * p);
-        });
-        return out;
-    }
-
-    Strains strain_rates(const double* step) override {
-        Strains out(this->elements(), 6 * points);
-        loop_.each_group([&](Index group) {
-            SimdVec3 x[N], d[N];
-            loop_.gather(group, state_.data(), x);
-            loop_.gather(group, step, d);
-            for (int p = 0; p < points; ++p)
-                ViscousStrain::rate(gradient_of(group, p, x), gradient_of(group, p, d),
-                                    out.at(group) + 6 * p);
-        });
-        return out;
-    }
-
-    Strains stresses(const Strains& strains) const override {
-        Strains out(this->elements(), 6 * points);
-        loop_.each_group([&](Index group) {
-            for (int p = 0; p < points; ++p) {
-                SimdDouble* s = out.at(group) + 6 * p;
-                ViscousStrain::stress(viscous_moduli(group), strains.at(group) + 6 * p, s);
-                for (int i = 0; i < 6; ++i) s[i] *= rest_[group].volume[p];
-            }
-        });
-        return out;
-    }
-
-    void add_forces(const Strains& stresses, Residual& out) override {
-        loop_.scatter_groups([&](Index group) {
-            SimdVec3 x[N], g[N], force[N];
-            loop_.gather(group, state_.data(), x);
-            for (int p = 0; p < points; ++p)
-                add_pull(group, p,
-                         multiply(gradient_of(group, p, x), Green::matrix(stresses.at(group) + 6 * p)), g,
-                         force);
-            loop_.scatter(group, force, out);
-        });
-    }
-
     std::size_t bytes() const override {
-        return this->bytes_of_elements() + bytes_of(stress_.groups) + bytes_of(extrapolated_.groups) +
-               bytes_of(state_) + (frozen_ ? bytes_of(frozen_->groups) : 0) + bytes_of(viscous_.own.groups) +
+        return this->bytes_of_elements() + bytes_of(constants_) + bytes_of(stress_.groups) +
+               bytes_of(extrapolated_.groups) + bytes_of(viscous_.own.groups) +
                bytes_of(viscous_.extrapolated.groups);
     }
 
   private:
+    struct Constants {
+        SimdDouble at[n_constants];
+    };
+    // The kinematics and the volumetric response of a SIMD vector of elements.
+    struct Gradients {
+        SimdMat3 f[points];
+
+        explicit Gradients(const SimdMat3* given) { std::copy_n(given, points, f); }
+        Gradients(const TetrahedraTerm& term, Index group, const double* q) {
+            term.gradients_of(group, q, f);
+        }
+    };
+    struct State {
+        SimdMat3 f[points];
+        Material at[points];
+        Volumetric volumetric[points];  // with a mean volume all the same
+        SimdDouble mean_measure;
+
+        State(const TetrahedraTerm& term, Index group, const double* q)
+            : State(term, group, Gradients(term, group, q)) {}
+        State(const TetrahedraTerm& term, Index group, const Gradients& given)
+            : State(term, group, given, std::make_index_sequence<points>()) {}
+
+        /// Evaluates the law at other measures, those of each point in a row.
+        void take_measures(const TetrahedraTerm& term, Index group, const SimdDouble* measures) {
+            const SimdDouble* c = term.constants_[group].at;
+            SimdDouble before[points];
+            for (int k = 0; k < points; ++k) before[k] = at[k].volume_measure();
+            const SimdDouble mean_before = mean_measure;
+            for (int p = 0; p < points; ++p) at[p].take_measures(measures + Material::stored_measures * p);
+            respond(term, group);
+            if (term.mean()) {
+                volumetric[0].bulk = Material::bulk_between(c, mean_measure, mean_before);
+                for (int k = 1; k < points; ++k) volumetric[k].bulk = volumetric[0].bulk;
+            } else {
+                for (int k = 0; k < points; ++k)
+                    volumetric[k].bulk = Material::bulk_between(c, at[k].volume_measure(), before[k]);
+            }
+        }
+
+      private:
+        void respond(const TetrahedraTerm& term, Index group) {
+            const SimdDouble* c = term.constants_[group].at;
+            if (term.mean()) {
+                SimdDouble sum(0.0);
+                for (int k = 0; k < points; ++k) sum += term.rest_[group].volume[k] * at[k].volume_measure();
+                mean_measure = sum / term.rest_[group].total();
+                volumetric[0] = Material::volumetric(c, mean_measure);
+                for (int k = 1; k < points; ++k) volumetric[k] = volumetric[0];
+            } else {
+                for (int k = 0; k < points; ++k)
+                    volumetric[k] = Material::volumetric(c, at[k].volume_measure());
+            }
+        }
+
+        template <std::size_t... p>
+        State(const TetrahedraTerm& term, Index group, const Gradients& given, std::index_sequence<p...>)
+            : f{given.f[p]...}, at{Material(given.f[p])...} {
+            respond(term, group);
+        }
+    };
+
     struct ViscousStresses {
         Strains own, extrapolated;
 
@@ -268,18 +265,55 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli>, publi
         }
     };
 
-    // Adds the derivatives by parameters of the power sum_p V_p P_p : L_p. rates(group, state, L) computes the L of a SIMD vector of elements.
-    template <class Rates>
-    void add_work_vjp(const double* q, const Rates& rates, Gradient& out) const {
-        struct Constants {
+    SimdDouble energy_of(Index group, const double* q) const override {
+        const State state(*this, group, q);
+        SimdDouble total = mean() ? rest_[group].total() * state.volumetric[0].energy : SimdDouble(0.0);
+        for (int p = 0; p < points; ++p) {
+            SimdDouble density = state.at[p].energy(constants_[group].at);
+            if (!mean()) density += state.volumetric[p].energy;
+            total += rest_[group].volume[p] * density;
+        }
+        return total;
+    }
+
+    void respond(Index group, const SimdMat3 f[points], const SimdMat3* rates,
+                 PointResponse out[points]) const override {
+        const std::array<SimdVec3, 4> axes = unit_gradients();
+        const State state(*this, group, Gradients(f));
+        const SimdDouble* c = constants_[group].at;
+        SimdDouble volume_rate(0.0);
+        for (int p = 0; p < points; ++p) {
+            SimdDouble s[stresses_];
+            state.at[p].stress(c, state.volumetric[p].pressure, s);
+            out[p].piola = state.at[p].piola(c, s);
+            if (!rates) continue;
+            const SimdDouble bulk = mean() ? SimdDouble(0.0) : state.volumetric[p].bulk;
+            const typename Material::template Tangent<4> tangent(state.at[p], c, s, bulk, SimdDouble(1.0),
+                                                                 axes.data());
+            out[p].rate = tangent_along(tangent, rates[p]);
+            out[p].volume_excess = SimdDouble(0.0);
+            volume_rate += rest_[group].volume[p] * state.at[p].volume_rate(rates[p]);
+        }
+        if constexpr (may_average) {
+            if (!mean() || !rates) return;
+            const SimdDouble pressure_rate = state.volumetric[0].bulk * volume_rate / rest_[group].total();
+            for (int p = 0; p < points; ++p) {
+                out[p].rate += pressure_rate * state.at[p].volume_piola();
+                out[p].volume_excess = pressure_rate * (state.at[p].volume_measure() - state.mean_measure);
+            }
+        }
+    }
+
+    void add_work_vjp(const double* q, const Rates& rates, Gradient& out) const override {
+        struct ByConstants {
             double by[n_constants];
         };
-        std::vector<Constants> of_elements(this->elements());
+        std::vector<ByConstants> of_elements(this->elements());
         loop_.each_group([&](Index group) {
             const State state(*this, group, q);
             const SimdDouble* c = constants_[group].at;
             SimdMat3 all_along[points];
-            rates(group, state, all_along);
+            rates(group, state.f, all_along);
             SimdDouble by[n_constants], share[n_constants], rate(0.0);
             for (SimdDouble& entry : by) entry = SimdDouble(0.0);
             const auto add = [&](const SimdDouble& factor) {
@@ -296,7 +330,9 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli>, publi
                     add(rate);
                     rate = SimdDouble(0.0);
                 }
-                if (this->history_.shift) add_viscous_vjp(group, p, state.f[p], along, by);
+                if (this->history_.shift)
+                    Material::rest_moduli_vjp(
+                        c, this->viscous_work_by_moduli(group, p, state.f[p], along), by);
             }
             if (mean()) {
                 Material::pressure_by_constants(c, state.mean_measure, share);
@@ -306,116 +342,43 @@ class TetrahedraTerm final : public Tetrahedra<Element, Material, Moduli>, publi
                 for (int k = 0; k < n_constants; ++k)
                     of_elements[loop_.element(group, lane)].by[k] = by[k][lane];
         });
-        for (Index t = 0; t < this->elements(); ++t) this->moduli_.add_vjp(t, of_elements[t].by, out);
+        for (Index t = 0; t < this->elements(); ++t) moduli_->add_vjp(t, of_elements[t].by, out);
     }
 
-    // Adds the derivatives of the same power by rest positions.
-    template <class Rates>
-    void add_work_rest_vjp(const double* q, const Rates& rates, VectorXd& out) const;
-    // Returns the function for rates along a motion of the nodes.
-    auto along_motion(const double* motion) const {
-        return [this, motion](Index group, const State&, SimdMat3 out[points]) {
-            SimdVec3 of_nodes[N];
-            loop_.gather(group, motion, of_nodes);
-            for (int p = 0; p < points; ++p) out[p] = gradient_of(group, p, of_nodes);
-        };
+    RestModuli rest_moduli(Index group) const override { return Material::rest_moduli(constants_[group].at); }
+    // The weight is the material's own, or the P-wave modulus of the reference configuration, 2 mu + lambda.
+    SimdDouble projective_weight(Index group) const override {
+        if constexpr (requires { Material::projective_weight(constants_[group].at); })
+            return Material::projective_weight(constants_[group].at);
+        const RestModuli moduli = rest_moduli(group);
+        return SimdDouble(2.0) * moduli.mu + moduli.lambda;
     }
-    // Returns the function for rates L = F^-T c of strains c.
-    auto along_strains(const Strains& strains) const {
-        return [&strains](Index group, const State& state, SimdMat3 out[points]) {
-            for (int p = 0; p < points; ++p) {
-                SimdDouble of_point[6];
-                for (int i = 0; i < 6; ++i)
-                    of_point[i] = SimdDouble(i < 3 ? 1.0 : 0.5) * strains.at(group)[6 * p + i];
-                const SimdMat3 cofactors = cofactor(state.f[p]);
-                out[p] = SimdDouble(1.0) / determinant(state.f[p], cofactors) *
-                         multiply(cofactors, Green::matrix(of_point));
-            }
-        };
-    }
-    // Returns the rates V S' of the second Piola-Kirchhoff stresses times volumes, S = F^-1 P.
-    template <class Rates>
-    Strains stress_rates(const double* q, const Rates& rates) const;
-    void assemble_frozen(const ElementBlock& element_block, SystemMatrix& out) const {
-        ElementLoop<N>::over_groups(element_block, [&](Index group) {
-            const SimdDouble zero(0.0);
-            SimdVec3 x[N], g[N];
-            SimdMat3 h[N * (N + 1) / 2];
-            loop_.gather(group, state_.data(), x);
-            for (int p = 0; p < points; ++p) {
-                Element::gradients(rest_[group].gradients[p], p, g);
-                add_blocks<N>(QuadraticTangent<N>(gradient_of(group, p, x), frozen_->at(group) + 6 * p, zero,
-                                                  zero, SimdDouble(1.0), g),
-                              p == 0, h);
-            }
-            complete_blocks<N>(h);
-            loop_.scatter(group, h, out);
-        });
-    }
-
-    // Returns B of the viscous part of lambda . g at a point (tetrahedra_rest.h).
-    SimdMat3 viscous_by_rest(Index group, int p, const SimdMat3& f, const SimdMat3& along) const;
-    // Adds the gradient with respect to rest positions of a function with the derivative B = of_points(group, B) by a deformation I + H of
-    // the rest shape at each point.
-    template <class OfPoints>
-    void add_rest(VectorXd& out, const OfPoints& of_points) const;
-
-    RestModuli viscous_moduli(Index group) const {
-        RestModuli moduli = Material::rest_moduli(constants_[group].at);
-        if (mean()) moduli.lambda = SimdDouble(-2.0 / 3.0) * moduli.mu;
-        return moduli;
-    }
-
-    // Computes (scale - 1) d - shift at a point.
-    void beyond_elastic(Index group, int p, const SimdMat3& f, SimdDouble d[6]) const {
-        ViscousStrain::at(f, d);
-        const SimdDouble* shift = this->history_.shift->at(group) + 6 * p;
-        for (int i = 0; i < 6; ++i) d[i] = SimdDouble(this->history_.scale - 1.0) * d[i] - shift[i];
-    }
+    double size_of_modulus(Index element) const override { return moduli_->size(element); }
+    RestModuli viscous_moduli(Index group) const { return this->viscous(rest_moduli(group)); }
 
     void viscous_stress(Index group, int p, const SimdMat3& f, SimdDouble s[6]) const {
         SimdDouble d[6];
-        beyond_elastic(group, p, f, d);
+        this->beyond_elastic(group, p, f, d);
         ViscousStrain::stress(viscous_moduli(group), d, s);
     }
 
-    void add_viscous_vjp(Index group, int p, const SimdMat3& f, const SimdMat3& along,
-                         SimdDouble by[n_constants]) const {
-        SimdDouble d[6], rate[6];
-        beyond_elastic(group, p, f, d);
-        ViscousStrain::rate(f, along, rate);
-        RestModuli moduli = ViscousStrain::work_by_moduli(d, rate);
-        moduli.lambda *= rest_[group].volume[p];
-        moduli.mu *= rest_[group].volume[p];
-        if (mean()) {
-            moduli.mu += SimdDouble(-2.0 / 3.0) * moduli.lambda;
-            moduli.lambda = SimdDouble(0.0);
-        }
-        Material::rest_moduli_vjp(constants_[group].at, moduli, by);
-    }
-
     const Index n_nodes_;
+    const std::unique_ptr<SolidModuli> moduli_;
+    std::vector<Constants> constants_;
     Strains stress_, extrapolated_;
     ViscousStresses viscous_;
-    std::optional<Strains> frozen_;  // V S' while stresses are held at their rates
-    std::vector<double> state_;      // positions of the last evaluated state
 };
-
-}  // namespace magshell
-
-#include "magshell/energy/st_venant_kirchhoff.h"
-#include "magshell/terms/solid/tetrahedra_rest.h"
-
-namespace magshell {
 
 /// Creates the term of a solid with linear or quadratic elements of a material.
 template <class Material, class Moduli>
 std::unique_ptr<SolidTerm> make_tetrahedra_term(const SolidTermInput& input) {
     const Solid& solid = input.solid;
+    auto moduli = std::make_unique<Moduli>(input);
     if (solid.quadratic())
-        return std::make_unique<TetrahedraTerm<QuadraticTetrahedron, Material, Moduli>>(
-            input, solid.quadratic_nodes);
-    return std::make_unique<TetrahedraTerm<LinearTetrahedron, Material, Moduli>>(input, solid.linear_nodes);
+        return std::make_unique<TetrahedraTerm<QuadraticTetrahedron, Material>>(input, solid.quadratic_nodes,
+                                                                                std::move(moduli));
+    return std::make_unique<TetrahedraTerm<LinearTetrahedron, Material>>(input, solid.linear_nodes,
+                                                                         std::move(moduli));
 }
 
 /// Lists an isochoric law under its name, and under "<name> poisson_ratio" for Poisson's ratio in place of the bulk
