@@ -87,6 +87,7 @@ def test_a_value_of_an_object(what, bending):
     check(solve, at)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_gravity_and_vertex_loads():
     scene = everything()
 

@@ -395,7 +395,8 @@ def test_a_path_follows_a_sheet_with_other_rest_positions():
     values = {scene.bodies[0]: {"rest_positions": MOVED}}
     path = ms.follow_path(scene, values=values, max_step=0.2, progress=False, **DEFAULTS)
     end = solved(scene, MOVED, **DEFAULTS)
-    assert path.positions[-1] == pytest.approx(end.positions, rel=0, abs=1e-8)
+    # The faces that sample the field finely are chosen at the start of a path, and once more at an equilibrium.
+    assert path.positions[-1] == pytest.approx(end.positions, rel=0, abs=2e-3 * np.ptp(MOVED))
     with pytest.raises(ValueError, match="a path keeps those of its start"):
         ms.follow_path(scene, start=end, progress=False, **DEFAULTS)
 

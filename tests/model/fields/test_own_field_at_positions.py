@@ -93,6 +93,7 @@ def test_solves_name_coincident_edges_at_their_start():
             call()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_edges_that_are_tied_or_apart_or_have_no_own_field_are_fine():
     tied, opened = pair((0.02, 0, 0), tied=True), with_slit(opened=1e-3)
     for scene in (tied, opened):
@@ -113,4 +114,4 @@ def test_what_is_not_finite_is_refused(function):
     with pytest.raises(
         ValueError, match="there is no energy at these positions: the membrane force on vertex"
     ):
-        function(scene, 1e100 * scene.mesh.rest_positions)
+        function(scene, 1e160 * scene.mesh.rest_positions)

@@ -16,6 +16,7 @@ pytest.importorskip("viser")
 
 MAGNETIZED = {"remanent_magnetization": (0, 0, 5e4)}
 CLOSE = 1e-7  # [-] two solves to the default tolerance, relative to the sheet's length
+SAMPLED = 1e-4  # the same where more faces sample the field finely, as those of earlier solves do
 TIMEOUT = 60.0  # [s]
 
 
@@ -55,7 +56,7 @@ def test_moved_magnet_gives_the_equilibrium_of_its_new_pose():
         assert view.equilibrium is moved
     values = {magnet: {"center": center, "rotation": rotation}}
     wanted = ms.equilibrium(scene, **MAGNETIZED, values=values)
-    assert np.abs(moved.positions - wanted.positions).max() < CLOSE * 0.04
+    assert np.abs(moved.positions - wanted.positions).max() < SAMPLED * 0.04
 
 
 def test_moved_magnet_keeps_what_is_not_given():
@@ -65,7 +66,7 @@ def test_moved_magnet_keeps_what_is_not_given():
         view.move(magnet, rotation=rotation)
         moved = view.move(magnet, center=far)
     wanted = ms.equilibrium(scene, **MAGNETIZED, values={magnet: {"center": far, "rotation": rotation}})
-    assert np.abs(moved.positions - wanted.positions).max() < CLOSE * 0.04
+    assert np.abs(moved.positions - wanted.positions).max() < SAMPLED * 0.04
 
 
 def test_values_of_the_first_solve_stay_while_a_magnet_moves():
@@ -106,7 +107,7 @@ def test_each_dipole_of_a_field_moves_and_turns_alone():
             view.move(dipoles, index=2)
     places, moments = [places[0], [0.03, 0.01, -0.05]], [moments[0], [0.5, 0, 0]]
     wanted = ms.equilibrium(scene, **MAGNETIZED, values={dipoles: {"positions": places, "moments": moments}})
-    assert np.abs(moved.positions - wanted.positions).max() < CLOSE * 0.04
+    assert np.abs(moved.positions - wanted.positions).max() < SAMPLED * 0.04
 
 
 def test_uniform_field_of_a_view_is_changed():

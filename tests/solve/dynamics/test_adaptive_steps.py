@@ -172,14 +172,14 @@ def test_tolerance_that_cannot_be_reached_leaves_the_motion_until_there() -> Non
 
 
 def test_default_tolerance_is_a_fraction_of_the_extent() -> None:
-    extent = 0.1  # the longest side
+    extent = np.hypot(0.1, 0.02)  # the diagonal
     move, given = (swinging_strip(2, ms.Adaptive(0.02, tolerance)) for tolerance in (None, 1e-4 * extent))
     np.testing.assert_array_equal(move.time_steps, given.time_steps)
     assert tolerance_of(move.scene, ms.Adaptive(0.02)) == pytest.approx(1e-4 * extent, rel=1e-12)
 
 
 def test_tolerance_below_round_off_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"tolerance \[m\] must be at least 1e-11 m, .* got 1e-12"):
+    with pytest.raises(ValueError, match=r"tolerance \[m\] must be at least 1.02e-11 m, .* got 1e-12"):
         swinging_strip(2, ms.Adaptive(0.02, 1e-12))
 
 

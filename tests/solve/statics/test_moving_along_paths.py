@@ -12,7 +12,7 @@ MESH = ms.meshes.rectangle(0.05, 0.02, cells=(5, 2))
 def test_a_path_of_equilibria_along_which_things_move():
     """Check that the end is an equilibrium after a magnet approaches and rotates, a clamp lifts and a floor rises."""
     # So far away that no face samples its field finely, which a path would not begin to do on its way.
-    magnet = ms.CuboidMagnet((0.04, 0.048, 0.032), (0, 1e4, 2e5), center=(0.05, 0.01, 0.12))
+    magnet = ms.CuboidMagnet((0.12, 0.144, 0.096), (0, 1e4, 2e5), center=(0.05, 0.01, 0.36))
     floor = ob.Plane(center=(0, 0, -0.01))
     clamp = ms.Clamp(MESH.edges_at(x=0.0), displacement=(0, 0, 0), rotation=(0, 0, 0))
     sheet = ms.Shell(MESH, thickness=1e-3, young_modulus=1e6, remanent_magnetization=(2e4, 0, 0))
@@ -20,7 +20,7 @@ def test_a_path_of_equilibria_along_which_things_move():
     scene = ms.Scene(sheet, supports=[clamp], field=magnet, contacts=[near])
     far = ms.equilibrium(scene)
     values = {
-        magnet: {"center": (0.05, 0.01, 0.1), "rotation": (0.3, 0.2, 0)},
+        magnet: {"center": (0.05, 0.01, 0.3), "rotation": (0.3, 0.2, 0)},
         clamp: {"displacement": (0, 0, 1e-3), "rotation": (0, -0.1, 0)},
         floor: {"center": (0, 0, -0.004)},
     }

@@ -119,10 +119,11 @@ def _slits(values: Values, number: int, positions: np.ndarray) -> np.ndarray:
     mesh = span.mesh
     if isinstance(body, Solid):
         return np.zeros((0, 2, 2), dtype=int)
-    border = np.flatnonzero((mesh.edge_faces < 0).any(axis=1))
+    beside = mesh.edge_faces if mesh.order == 1 else mesh.edge_elements
+    border = np.flatnonzero((beside < 0).any(axis=1))
     label = next(label for each, label in scene._labels if each is body)
     magnetization = scene._value_layout.of(values.numbers, label, "remanent_magnetization")
-    magnetization = np.broadcast_to(magnetization, (mesh.n_elements, 3))[mesh.edge_faces[border].max(axis=1)]
+    magnetization = np.broadcast_to(magnetization, (mesh.n_elements, 3))[beside[border].max(axis=1)]
     along = mesh.rest_positions[mesh.edges[border]]
     across = np.linalg.norm(np.cross(magnetization, along[:, 1] - along[:, 0]), axis=1)
     sizes = np.linalg.norm(magnetization, axis=1) * mesh.edge_lengths[border]

@@ -23,6 +23,7 @@ from ..statics.balance import (
     sums_by_name,
     term_kinds,
 )
+from .step_errors import has_large_errors
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -232,7 +233,7 @@ def describe_energy(move: Trajectory) -> str:
 
 def _warn_of_rest(move: Trajectory, balance: EnergyBalance) -> None:
     """Warn of a rest that is large, unless the errors of the steps have been warned of."""
-    if not balance.rest_fraction > LARGEST_REST or move.scene._warned_of_steps or move.scene._warned_of_gains:
+    if not balance.rest_fraction > LARGEST_REST or has_large_errors(move) or move.scene._warned_of_gains:
         return
     # One digit: Python shows a warning once for each place and text, so that a loop over motions does not repeat it.
     worst = balance.rest[np.argmax(np.abs(balance.rest))]

@@ -59,6 +59,12 @@ def describe_steps(move: Trajectory) -> str:
     return f"steps of {lengths}, each with an error of at most {worst:.2g} m (estimated{share})"
 
 
+def has_large_errors(move: Trajectory) -> bool:
+    """Return whether the estimated error of a step is more than 1 % of the extent."""
+    extent = extent_of(move.scene)
+    return bool(extent > 0.0 and (move.step_errors >= LARGEST_ERROR * extent).any())
+
+
 def warn_of_steps(move: Trajectory) -> None:
     """Warn that errors of steps are large, or that many steps took many factorizations.
 
@@ -74,7 +80,7 @@ def warn_of_steps(move: Trajectory) -> None:
     dear = np.flatnonzero(move._step_factorizations > MANY_FACTORIZATIONS)
     were_divided = len(errors) > move.steps  # by ms.Adaptive or by the caller
     is_dear = len(dear) >= _FEWEST and len(dear) > _OFTEN * len(errors) and not were_divided
-    is_wrong = errors[worst] >= limit
+    is_wrong = has_large_errors(move)
     if not is_wrong and (not is_dear or scene._warned_of_dear_steps):
         return
     length = move.time_steps[worst]
