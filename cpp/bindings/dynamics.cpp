@@ -115,7 +115,8 @@ MotionInput input_of(Model& model, const py::dict& given) {
         if (MaxwellStrains rates = strains_of(model, array("strain_rates"), 1); !rates.empty())
             input.start.rates.elastic.d = std::move(rates.front());
         input.start.rates.elastic.e = strains_of(model, array("maxwell_strain_rates"), branches);
-        if (model.may_carry_momentum()) input.start.rates.momentum_rate = to_vector(array("momentum_rate"));
+        if (model.may_have_fluid_momentum())
+            input.start.rates.momentum_rate = to_vector(array("momentum_rate"));
     }
     input.rotations_given = given["rotations_given"].cast<bool>();
     input.tableau = tableau_of(given["integrator"].cast<std::string>());

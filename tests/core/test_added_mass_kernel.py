@@ -28,7 +28,7 @@ def kinetic_energy(x, v, flow=FLOW):
     return 0.5 * ADDED_MASS * area * speed**2
 
 
-def test_everything_follows_from_the_kinetic_energy(rng):
+def test_momentum_and_forces_follow_from_the_kinetic_energy(rng):
     """Differentiate T twice by positions and velocities, and compare: p, dT/dx, dp/dx, dp/dv, d2T/dx2 and v . p - T."""
     x, v = random_faces(rng)
     found = _core.added_mass_faces(water()._core, x, v)

@@ -31,8 +31,8 @@ PRECISION_OF_ONE = 1e-3  # of the share of one input in the slope along the one 
 PRECISION_OF_TANGENTS = 1e-6  # of that share
 
 
-# Tangents of responses are differences of stiffness matrices. Near the dipoles the field of this sheet's finely sampled faces
-# leaves 6e-6 of them; its adjoint agrees with extrapolated differences to 1e-10.
+# Tangents of responses are differences of stiffness matrices. Near the dipoles the field at the finely sampled faces of this
+# sheet leaves 6e-6 of them; its adjoint agrees with extrapolated differences to 1e-10.
 LESS_PRECISE_TANGENTS = {"a bent sheet that responds by linear theory": 1e-5}
 
 

@@ -30,7 +30,7 @@ VISCOUS = {
     "maxwell_modulus": np.array((0.5, 0.2)),
     "maxwell_time": np.array((4e-3, 1.5e-2)),
 }
-# Of ms.Water: with a lower bound of zero, differences need values away from it.
+# Numbers of ms.Water. Their lower bound is zero, and differences need values away from it.
 IN_WATER = {
     "drag_coefficient": 0.9,
     "thrust_coefficient": 0.7,

@@ -154,7 +154,7 @@ class Backward {
         const StepRates at(model_, algebra, stepper_.free_bodies(), record, load_parameters);
         FreeFlightAdjoint flight(at.flight);
 
-        const bool carries = model_.may_carry_momentum();
+        const bool carries = model_.may_have_fluid_momentum();
         std::vector<VectorXd> by_v(first + n, VectorXd::Zero(model_.size())), by_w = by_v, by_r;
         VectorXd by_momentum;  // by the carried momentum at the beginning
         if (carries) {

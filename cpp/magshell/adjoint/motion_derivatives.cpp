@@ -227,14 +227,14 @@ PrescribedTangent MotionDerivatives::prescribed(const StageTangent& stage, const
     return {all.head(n), all.segment(n, n), all.tail(all.size() - 2 * n)};
 }
 
-VectorXd MotionDerivatives::carried_momentum(const VectorXd& q, const VectorXd& v, const VectorXd& q_tangent,
-                                             const VectorXd& v_tangent, const LoadParameters& load_parameters,
-                                             const LoadParameters& tangent) {
-    if (!model_.may_carry_momentum()) return {};
+VectorXd MotionDerivatives::fluid_momentum(const VectorXd& q, const VectorXd& v, const VectorXd& q_tangent,
+                                           const VectorXd& v_tangent, const LoadParameters& load_parameters,
+                                           const LoadParameters& tangent) {
+    if (!model_.may_have_fluid_momentum()) return {};
     const VectorXd found = momentum_.of(
         [&](double t) {
             const Model& there = set(t, load_parameters + t * tangent);
-            return there.carried_momentum(q + t * q_tangent, v + t * v_tangent);
+            return there.fluid_momentum(q + t * q_tangent, v + t * v_tangent);
         },
         step_along({{along_.length, largest(q_tangent)}, {largest(v), largest(v_tangent)}}), 0.0,
         "the momentum of water");

@@ -69,9 +69,9 @@ class MotionDerivatives {
     StrainSet strains(ViscousTerms& terms, const VectorXd& q, const VectorXd& motion,
                       const LoadParameters& load_parameters, const LoadParameters& tangent);
     /// Returns the derivative of the momentum that forces carry at q and v; empty if none may.
-    VectorXd carried_momentum(const VectorXd& q, const VectorXd& v, const VectorXd& q_tangent,
-                              const VectorXd& v_tangent, const LoadParameters& load_parameters,
-                              const LoadParameters& tangent);
+    VectorXd fluid_momentum(const VectorXd& q, const VectorXd& v, const VectorXd& q_tangent,
+                            const VectorXd& v_tangent, const LoadParameters& load_parameters,
+                            const LoadParameters& tangent);
     /// Returns the derivative of the strain rates of joint dampers at the beginning of a step, for the tangents of q and v there.
     StrainSet damper_rates(const MotionState& begin, const VectorXd& q_tangent, const VectorXd& v_tangent,
                            const LoadParameters& load_parameters, const LoadParameters& tangent);

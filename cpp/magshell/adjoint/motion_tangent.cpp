@@ -252,7 +252,7 @@ class ForwardSweep {
                 derivatives_.strains(model_.dampers(), record.begin.q, tangent_.q, begin, begin_tangent), {},
                 {}, first ? &at.all.front() : nullptr, first ? &tangents.front() : nullptr);
 
-        const VectorXd momentum_tangent = derivatives_.carried_momentum(
+        const VectorXd momentum_tangent = derivatives_.fluid_momentum(
             record.begin.q, record.begin.v, tangent_.q, tangent_.v, begin, begin_tangent);
         VectorXd q_tangent, motor_forces;
         for (int i = 0; i < n; ++i) {
@@ -316,8 +316,8 @@ class ForwardSweep {
                 now.acceleration -= stage.contact_factor * now.c;
             }
             if (p_hat_tangent.size() > 0)
-                now.momentum_rate = (derivatives_.carried_momentum(q, v, q_tangent, now.v,
-                                                                   stage.load_parameters, stage.tangent) -
+                now.momentum_rate = (derivatives_.fluid_momentum(q, v, q_tangent, now.v,
+                                                                 stage.load_parameters, stage.tangent) -
                                      p_hat_tangent - T_tangent * at.all[first + i].momentum_rate) /
                                     T;
             if (!strains.idle())

@@ -333,8 +333,8 @@ double Bodies::extent() const {
     double largest = 0.0;
     for (const Shell* shell : shells_) largest = std::max(largest, shell->extent());
     for (const Rows3& points : rigid_points_)
-        largest = std::max(
-            largest, 2.0 * (points.rowwise() - points.colwise().mean()).rowwise().norm().maxCoeff());
+        largest =
+            std::max(largest, 2.0 * (points.rowwise() - points.colwise().mean()).rowwise().norm().maxCoeff());
     for (const Solid* solid : solids_) largest = std::max(largest, solid->extent());
     for (const SixNodeShell* shell : six_node_shells_) largest = std::max(largest, shell->extent());
     return largest;

@@ -448,8 +448,8 @@ void Model::evaluate_forces(const VectorXd& q, const LoadParameters& load_parame
     kinematics_.v.setZero(size());
     kinematics_.v.head(coordinates) = kinematics_.rate * (q - *stage.x_hat).head(coordinates);
     kinematics_.momentum_rate.resize(0);
-    if (may_carry_momentum()) {
-        kinematics_.momentum_rate = kinematics_.rate * (carried_momentum(q, kinematics_.v) - *stage.p_hat);
+    if (may_have_fluid_momentum()) {
+        kinematics_.momentum_rate = kinematics_.rate * (fluid_momentum(q, kinematics_.v) - *stage.p_hat);
         residual_.gradient += kinematics_.momentum_rate;
         residual_.magnitude += kinematics_.momentum_rate.cwiseAbs();
     }
@@ -457,21 +457,21 @@ void Model::evaluate_forces(const VectorXd& q, const LoadParameters& load_parame
         force->evaluate(kinematics_, load_parameters, residual_);
 }
 
-bool Model::may_carry_momentum() const {
+bool Model::may_have_fluid_momentum() const {
     return std::any_of(terms_.forces.begin(), terms_.forces.end(),
-                       [](const auto& force) { return force->may_carry_momentum(); });
+                       [](const auto& force) { return force->may_have_fluid_momentum(); });
 }
 
-VectorXd Model::carried_momentum(const VectorXd& q, const VectorXd& v) const {
-    if (!may_carry_momentum()) return {};
+VectorXd Model::fluid_momentum(const VectorXd& q, const VectorXd& v) const {
+    if (!may_have_fluid_momentum()) return {};
     VectorXd momentum = VectorXd::Zero(size());
     for (const std::unique_ptr<ForceTerm>& force : terms_.forces) force->add_momentum(q, v, momentum);
     return momentum;
 }
 
-double Model::carried_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q) const {
+double Model::fluid_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q) const {
     double sum = 0.0;
-    for (const std::unique_ptr<ForceTerm>& force : terms_.forces) sum += force->carried_energy(q, v, by_q);
+    for (const std::unique_ptr<ForceTerm>& force : terms_.forces) sum += force->fluid_energy(q, v, by_q);
     return sum;
 }
 

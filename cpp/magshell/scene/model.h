@@ -113,11 +113,11 @@ class Model {
     void freeze_normal_forces(bool held);
     const NonsymmetricTangent& nonsymmetric_tangent() const { return nonsymmetric_; }
     /// Returns true if forces may carry momentum beside that of the masses (ForceTerm::add_momentum()).
-    bool may_carry_momentum() const;
+    bool may_have_fluid_momentum() const;
     /// Returns the momentum p(q, v) of all dofs that they carry [N s]; empty if none may.
-    VectorXd carried_momentum(const VectorXd& q, const VectorXd& v) const;
+    VectorXd fluid_momentum(const VectorXd& q, const VectorXd& v) const;
     /// Returns the energy that belongs to it, v . p - T [J], and adds dT/dq [N] to `by_q` unless that is null.
-    double carried_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q = nullptr) const;
+    double fluid_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q = nullptr) const;
     /// The kinematics at which the forces were evaluated last.
     const Kinematics& kinematics() const { return kinematics_; }
 

@@ -24,9 +24,9 @@ class TermForces {
     }
 
     /// Returns the first force that may carry momentum, for what all of them carry; -1 without one.
-    Index carrier() const {
+    Index fluid_term() const {
         for (Index k = energies_; k < rows_; ++k)
-            if (model_.terms().forces[k - energies_]->may_carry_momentum()) return k;
+            if (model_.terms().forces[k - energies_]->may_have_fluid_momentum()) return k;
         return -1;
     }
 

@@ -71,14 +71,14 @@ class ForceTerm {
                      KinematicsGradient& by, Gradient& out) const = 0;
 
     /// Returns true if it may carry momentum, with other parameters if not with the present ones.
-    virtual bool may_carry_momentum() const { return false; }
+    virtual bool may_have_fluid_momentum() const { return false; }
     /// Adds p(q, v) [N s].
     virtual void add_momentum(const VectorXd& /*q*/, const VectorXd& /*v*/, VectorXd& /*out*/) const {}
     /// Adds lambda . dp/dq, lambda . dp/dv and lambda . dp/dk.
     virtual void momentum_vjp(const VectorXd& /*q*/, const VectorXd& /*v*/, const VectorXd& /*lambda*/,
                               VectorXd& /*by_q*/, VectorXd& /*by_v*/, Gradient& /*out*/) const {}
     /// Returns v . p - T [J] of the kinetic energy T whose derivative by v is p, and adds dT/dq [N] to `by_q` unless that is null.
-    virtual double carried_energy(const VectorXd& /*q*/, const VectorXd& /*v*/, VectorXd* /*by_q*/) const {
+    virtual double fluid_energy(const VectorXd& /*q*/, const VectorXd& /*v*/, VectorXd* /*by_q*/) const {
         return 0.0;
     }
 

@@ -108,7 +108,7 @@ def test_edges_that_are_tied_or_apart_or_have_no_own_field_are_fine():
 
 
 @pytest.mark.parametrize("function", TOLD, ids=names)
-def test_what_is_not_finite_is_refused(function):
+def test_energies_that_are_not_finite_are_refused(function):
     """Check strains whose square is no number any more."""
     scene = ms.Scene(strip(), allow_rigid_motions=True)
     with pytest.raises(

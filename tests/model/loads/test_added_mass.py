@@ -141,7 +141,7 @@ def test_a_periodic_motion_gets_no_mean_force():
     frequency, per_period, periods = 4.0, 80, 4
 
     def flapping(t):
-        """Rises slowly and falls fast, the same in each period."""
+        """Return a flux density that rises slowly and falls fast, the same in each period, T."""
         s = (t * frequency) % 1.0
         up = 0.5 - 0.5 * np.cos(np.pi * s / 0.8) if s < 0.8 else 0.5 + 0.5 * np.cos(np.pi * (s - 0.8) / 0.2)
         return (0, 0, 8e-2 * up - 3e-2)

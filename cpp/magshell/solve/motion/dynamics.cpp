@@ -43,7 +43,7 @@ void record_state(const Model& model, const MotionInput& input, MotionResult& re
     result.recorded.push_back(
         {state.q, state.v, state.angle_branches, {}, {}, state.motor_forces, state.held});
     result.kinetic_energy.push_back(0.5 * state.v.dot(input.inertia.mass.cwiseProduct(state.v)) +
-                                    model.carried_energy(state.q, state.v));
+                                    model.fluid_energy(state.q, state.v));
     result.energies.emplace_back(model.term_names().size(), std::numeric_limits<double>::quiet_NaN());
 }
 
@@ -178,7 +178,7 @@ class Run {
         const std::size_t vector = sizeof(double) * model_.size();
         const std::size_t strains = sizeof(double) * model_.elastic().size();
         const bool implicit_contact = input_.tableau.implicit_contact;
-        const bool carries = explicit_first && model_.may_carry_momentum();
+        const bool carries = explicit_first && model_.may_have_fluid_momentum();
         std::size_t state =
             ((explicit_first ? 4 : 2) + (implicit_contact ? 1 : 0) + (carries ? 1 : 0)) * vector;
         const std::size_t branches = input_.viscosity.branches.size();

@@ -34,7 +34,7 @@ EnergyBalance::StateEnergy EnergyBalance::state_energy(const MotionState& state,
 
 double EnergyBalance::kinetic(const MotionState& state, const LoadParameters& load_parameters) {
     model_.parameters().set_time_varying(load_parameters);
-    return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)) + model_.carried_energy(state.q, state.v);
+    return 0.5 * state.v.dot(mass_.cwiseProduct(state.v)) + model_.fluid_energy(state.q, state.v);
 }
 
 bool EnergyBalance::has_contact(const StepAlgebra& step, const SubstepRecord& record,
@@ -98,7 +98,7 @@ double EnergyBalance::work(const StepAlgebra& step, const SubstepRecord& record,
         VectorXd forces = mass_.cwiseProduct(rates.acceleration) + model_.residual().gradient;
         if (rates.momentum_rate.size() > 0) {
             VectorXd of_water = VectorXd::Zero(q.size());
-            model_.carried_energy(q, rates.v, &of_water);
+            model_.fluid_energy(q, rates.v, &of_water);
             forces += rates.momentum_rate - of_water;
         }
         sum += tableau.a[tableau.stages - 1][j] * rates.v.dot(forces);

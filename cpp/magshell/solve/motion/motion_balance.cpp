@@ -95,7 +95,7 @@ class Accountant {
     void add_viscous(const Instant& at, const StrainRates& elastic, const StrainRates& joints, Rates& to);
     // Adds what follows from the momentum that a force carries, which counts as the scene's: the force leaves its energy as
     // it is, and at a node it has the moment of v x p besides that of its rate.
-    void add_carried(const Instant& at, Rates& to);
+    void add_fluid(const Instant& at, Rates& to);
     // Adds the work of parameters that change by `change` on the energies, without or with only implicit contact, and that of
     // the motors and directions that follow them.
     void add_driven(const VectorXd& q, const VectorXd& v, const Model::AngleBranches& angle_branches,
@@ -241,17 +241,17 @@ void Accountant::add_viscous(const Instant& at, const StrainRates& elastic, cons
     }
 }
 
-void Accountant::add_carried(const Instant& at, Rates& to) {
+void Accountant::add_fluid(const Instant& at, Rates& to) {
     if (at.momentum_rate.size() == 0) return;
     to.reactions += at.momentum_rate;
-    const VectorXd momentum = model_.carried_momentum(at.q, at.v);
+    const VectorXd momentum = model_.fluid_momentum(at.q, at.v);
     VectorXd by_q = VectorXd::Zero(at.q.size());
-    model_.carried_energy(at.q, at.v, &by_q);
-    const Index row = terms_.carrier();
+    model_.fluid_energy(at.q, at.v, &by_q);
+    const Index row = terms_.fluid_term();
     to.forces(row, 0) -= by_q.dot(at.v);
     for (Index node = 0; node < model_.nodes().n_vertices(); ++node)
-        to.forces.row(row).tail<3>() += Eigen::Vector3d(at.v.segment<3>(3 * node))
-                                            .cross(Eigen::Vector3d(momentum.segment<3>(3 * node)));
+        to.forces.row(row).tail<3>() +=
+            Eigen::Vector3d(at.v.segment<3>(3 * node)).cross(Eigen::Vector3d(momentum.segment<3>(3 * node)));
 }
 
 Accountant::Rates Accountant::rates(const Instant& at, bool implicit_contact, const StrainRates& elastic,
@@ -266,7 +266,7 @@ Accountant::Rates Accountant::rates(const Instant& at, bool implicit_contact, co
         add_force(-gradient, at.q, at.v, row, found.forces);
         found.reactions += gradient;
     });
-    add_carried(at, found);
+    add_fluid(at, found);
     add_viscous(at, elastic, joints, found);
     add_reactions(found.reactions, inertial, at.q, at.v, found.forces);
     return found;
@@ -297,13 +297,13 @@ void Accountant::add_driven(const VectorXd& q, const VectorXd& v, const Model::A
                                   [&](Index row) { return terms_.is_contact(row) ? contact : others; });
     };
     driven_ += (energies(difference) - energies(-difference)) / (2.0 * difference);
-    if (others && model_.may_carry_momentum()) {
-        // The carried energy v . p - T changes at fixed q and p by - dT.
+    if (others && model_.may_have_fluid_momentum()) {
+        // The energy of the fluid, v . p - T, changes at fixed q and p by - dT.
         const auto kinetic = [&](double factor) {
             model_.parameters().set_time_varying(load_parameters + factor * change);
-            return v.dot(model_.carried_momentum(q, v)) - model_.carried_energy(q, v);
+            return v.dot(model_.fluid_momentum(q, v)) - model_.fluid_energy(q, v);
         };
-        sums_(terms_.carrier(), 0) -= (kinetic(difference) - kinetic(-difference)) / (2.0 * difference);
+        sums_(terms_.fluid_term(), 0) -= (kinetic(difference) - kinetic(-difference)) / (2.0 * difference);
     }
     model_.parameters().set_time_varying(load_parameters);
     if (!model_.dof_map().has_prescribed_motion()) return;
@@ -378,7 +378,12 @@ void Accountant::add(const StepAlgebra& step, const SubstepRecord& record, const
             const double T = step.stage_time();
             const VectorXd x_hat = begins ? VectorXd(q - T * v) : at.x_hat[point - 1],
                            p_hat = begins ? VectorXd(VectorXd::Zero(q.size())) : at.p_hat[point - 1];
-            last_ = rates({q, branches, load_parameters[point], v, acceleration, at.all[j].momentum_rate,
+            last_ = rates({q,
+                           branches,
+                           load_parameters[point],
+                           v,
+                           acceleration,
+                           at.all[j].momentum_rate,
                            {&x_hat, &p_hat, T}},
                           tableau.implicit_contact, at.all[j].elastic, at.all[j].joints);
         }
@@ -427,8 +432,8 @@ MotionBalance::State Accountant::state(const MotionState& at, const LoadParamete
         }
     }
     VectorXd momentum = input_.inertia.mass.cwiseProduct(at.v);
-    found.kinetic = 0.5 * at.v.dot(momentum) + model_.carried_energy(at.q, at.v);
-    if (model_.may_carry_momentum()) momentum += model_.carried_momentum(at.q, at.v);
+    found.kinetic = 0.5 * at.v.dot(momentum) + model_.fluid_energy(at.q, at.v);
+    if (model_.may_have_fluid_momentum()) momentum += model_.fluid_momentum(at.q, at.v);
     for (Index node = 0; node < model_.nodes().n_vertices(); ++node) {
         const Eigen::Vector3d of_node = momentum.segment<3>(3 * node), place = at.q.segment<3>(3 * node);
         found.momenta.head<3>() += of_node;

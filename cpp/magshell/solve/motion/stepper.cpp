@@ -108,7 +108,7 @@ NewtonReport Stepper::solve(VectorXd& q, const MotionState& begin, const LoadPar
 const Tableau& Stepper::tableau_from(const MotionState& state, bool dissipative) const {
     if (dissipative) return dissipative_;
     const bool known = !state.rates.empty() && (!tableau_.implicit_contact || state.rates.c.size() > 0) &&
-                       (state.rates.momentum_rate.size() > 0 || !newton_.model().may_carry_momentum());
+                       (state.rates.momentum_rate.size() > 0 || !newton_.model().may_have_fluid_momentum());
     return tableau_.begins_explicitly && !known ? starter_ : tableau_;
 }
 
@@ -134,11 +134,11 @@ StepRates::StepRates(Model& model, const StepAlgebra& step, const std::vector<Fr
       v_hat(substep.stages.size()),
       p_hat(substep.stages.size()),
       all(first_rates(model, step.tableau(), substep.begin)) {
-    const bool carries = model.may_carry_momentum();
+    const bool carries = model.may_have_fluid_momentum();
     VectorXd momentum;
     if (carries) {
         model.parameters().set_time_varying(load_parameters.front());
-        momentum = model.carried_momentum(substep.begin.q, substep.begin.v);
+        momentum = model.fluid_momentum(substep.begin.q, substep.begin.v);
     }
     for (int i = 0; i < static_cast<int>(substep.stages.size()); ++i) {
         const VectorXd& q = substep.stages[i].q;
@@ -150,7 +150,7 @@ StepRates::StepRates(Model& model, const StepAlgebra& step, const std::vector<Fr
         step.finish_stage(i, q, x_hat[i], v_hat[i], model.n_coordinates(), now);
         if (!carries) continue;
         model.parameters().set_time_varying(load_parameters[i + 1]);
-        now.momentum_rate = (model.carried_momentum(q, now.v) - p_hat[i]) / step.stage_time();
+        now.momentum_rate = (model.fluid_momentum(q, now.v) - p_hat[i]) / step.stage_time();
     }
     if (carries) model.parameters().set_time_varying(load_parameters.front());
 }
@@ -172,9 +172,9 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     const Tableau& tableau = step.tableau();
     Model& model = newton_.model();
     const Index coordinates = model.n_coordinates();
-    const bool carries = model.may_carry_momentum();
+    const bool carries = model.may_have_fluid_momentum();
     if (carries) model.parameters().set_time_varying(load_parameters.front());
-    const VectorXd momentum = model.carried_momentum(state.q, state.v);
+    const VectorXd momentum = model.fluid_momentum(state.q, state.v);
     model.set_angle_branches(state.angle_branches);
     model.begin_step(state.q, load_parameters.front());
     const ScopedStrainHistory elastic_afterwards(model);
@@ -268,7 +268,7 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
             held = model.dof_map().along_supports(held);
         }
         step.finish_stage(i, q, x_hat, v_hat, coordinates, now);
-        if (carries) now.momentum_rate = (model.carried_momentum(q, now.v) - p_hat) / step.stage_time();
+        if (carries) now.momentum_rate = (model.fluid_momentum(q, now.v) - p_hat) / step.stage_time();
         if (i + 1 == tableau.stages && model.dof_map().has_motors())
             motor_forces = MotorReactions(newton_, inertia_, state, step, q, load_parameters[i + 1], proximal,
                                           v_hat, now)

@@ -57,7 +57,7 @@ void WaterTerm::evaluate(const Kinematics& at, const LoadParameters&, Residual& 
 // the system matrix, which stays positive definite; the rest goes into the nonsymmetric tangent.
 void WaterTerm::assemble(const Kinematics& at, const LoadParameters&, bool, SystemMatrix& out,
                          NonsymmetricTangent& rest) const {
-    const bool inertial = carries_momentum();
+    const bool inertial = has_added_mass();
     NonsymmetricTangent::FaceBlock* const shared = rest.append_face_blocks(surface_.n_faces());
     std::vector<NonsymmetricTangent::PairBlock> pairs(inertial ? surface_.n_faces() : 0);
     loop_.scatter_groups([&](Index group) {
@@ -123,7 +123,7 @@ void WaterTerm::vjp(const Kinematics& at, const LoadParameters&, const VectorXd&
 }
 
 void WaterTerm::add_momentum(const VectorXd& q, const VectorXd& v, VectorXd& out) const {
-    if (!carries_momentum()) return;
+    if (!has_added_mass()) return;
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         const MovingFace face = moving_face(q, v, f);
         const Vec3 momentum = AddedMass(water_.added_mass, face).corner_momentum();
@@ -148,9 +148,9 @@ void WaterTerm::momentum_vjp(const VectorXd& q, const VectorXd& v, const VectorX
     }
 }
 
-double WaterTerm::carried_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q) const {
+double WaterTerm::fluid_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q) const {
     double sum = 0.0;
-    if (!carries_momentum()) return sum;
+    if (!has_added_mass()) return sum;
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         const MovingFace face = moving_face(q, v, f);
         const AddedMass added(water_.added_mass, face);
@@ -164,7 +164,7 @@ double WaterTerm::carried_energy(const VectorXd& q, const VectorXd& v, VectorXd*
 
 // A momentum over the time of a stage has the round-off of positions, as the inertial force of the masses has, and that of itself.
 void WaterTerm::add_cancelling_forces(const Kinematics& at, VectorXd& out) const {
-    if (!carries_momentum()) return;
+    if (!has_added_mass()) return;
     for (Index f = 0; f < surface_.n_faces(); ++f) {
         const MovingFace face = moving_face(at.q, at.v, f);
         const MovingFace::Corners x = corners_of(surface_.corners[f], at.q);

@@ -25,14 +25,14 @@ class WaterTerm final : public ForceTerm {
              KinematicsGradient& by, Gradient& out) const override;
     void add_cancelling_forces(const Kinematics& at, VectorXd& out) const override;
 
-    bool may_carry_momentum() const override { return true; }
+    bool may_have_fluid_momentum() const override { return true; }
     void add_momentum(const VectorXd& q, const VectorXd& v, VectorXd& out) const override;
     void momentum_vjp(const VectorXd& q, const VectorXd& v, const VectorXd& lambda, VectorXd& by_q,
                       VectorXd& by_v, Gradient& out) const override;
-    double carried_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q) const override;
+    double fluid_energy(const VectorXd& q, const VectorXd& v, VectorXd* by_q) const override;
 
   private:
-    bool carries_momentum() const { return water_.added_mass > 0.0; }
+    bool has_added_mass() const { return water_.added_mass > 0.0; }
     MovingFace moving_face(const VectorXd& q, const VectorXd& v, Index face) const;
 
     const Surface& surface_;

@@ -134,8 +134,7 @@ std::string Tetrahedra<Element>::invalid_state_reason(const double* q) const {
     }
     if (first == std::numeric_limits<Index>::max()) return {};
     return "element " + std::to_string(first) + " of " + solid_.owner +
-           " is turned inside out (J = " + std::to_string(least) +
-           "), for which its material has no energy";
+           " is turned inside out (J = " + std::to_string(least) + "), for which its material has no energy";
 }
 
 template <class Element>
@@ -146,8 +145,7 @@ void Tetrahedra<Element>::add_cancelling_forces(double beyond, VectorXd& out) co
         const double stiffness = size_of_modulus(t);
         double coordinate = beyond;
         for (int k = 0; k < N; ++k)
-            coordinate =
-                std::max(coordinate, beyond + solid_.rest(t, k).template lpNorm<Eigen::Infinity>());
+            coordinate = std::max(coordinate, beyond + solid_.rest(t, k).template lpNorm<Eigen::Infinity>());
         for (int p = 0; p < points; ++p) {
             SimdVec3 g[N];
             Element::gradients(rest.gradients[p], p, g);
@@ -171,8 +169,8 @@ PointStates Tetrahedra<Element>::point_states(const double* q) const {
         respond(group, all, nullptr, response);
         for (int p = 0; p < points; ++p) {
             const SimdMat3& f = all[p];
-            const SimdMat3 cauchy = SimdDouble(1.0) / determinant(f, cofactor(f)) *
-                                    multiply(response[p].piola, transpose(f));
+            const SimdMat3 cauchy =
+                SimdDouble(1.0) / determinant(f, cofactor(f)) * multiply(response[p].piola, transpose(f));
             for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
                 const std::size_t at =
                     static_cast<std::size_t>(solid_.elements.user[loop_.element(group, lane)]) * points + p;
@@ -202,8 +200,8 @@ auto Tetrahedra<Element>::along_strains(const Strains& strains) -> Rates {
             for (int i = 0; i < 6; ++i)
                 of_point[i] = SimdDouble(i < 3 ? 1.0 : 0.5) * strains.at(group)[6 * p + i];
             const SimdMat3 cofactors = cofactor(f[p]);
-            out[p] = SimdDouble(1.0) / determinant(f[p], cofactors) *
-                     multiply(cofactors, Green::matrix(of_point));
+            out[p] =
+                SimdDouble(1.0) / determinant(f[p], cofactors) * multiply(cofactors, Green::matrix(of_point));
         }
     };
 }

@@ -331,8 +331,8 @@ class TetrahedraTerm final : public Tetrahedra<Element> {
                     rate = SimdDouble(0.0);
                 }
                 if (this->history_.shift)
-                    Material::rest_moduli_vjp(
-                        c, this->viscous_work_by_moduli(group, p, state.f[p], along), by);
+                    Material::rest_moduli_vjp(c, this->viscous_work_by_moduli(group, p, state.f[p], along),
+                                              by);
             }
             if (mean()) {
                 Material::pressure_by_constants(c, state.mean_measure, share);

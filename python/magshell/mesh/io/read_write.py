@@ -146,8 +146,9 @@ def write_mesh(
     Args:
         path: the file, which ends in .vtu, .msh (format 4.1, in text, without fields) or .ply.
         mesh: the mesh to write. The parts of tetrahedra are written as the cell field `part`, their names as fields of zeros
-            and ones, `part:` and the name. Fields on the faces of a solid are written with the mesh's `surface`. The curved elements of a QuadraticTriangleMesh are
-            written, and `face_fields` belong to them; fields on its flat faces are written with its `surface` as well.
+            and ones, `part:` and the name. Fields on the faces of a solid are written with the mesh's `surface`. The curved
+            elements of a QuadraticTriangleMesh are written, and `face_fields` belong to them; fields on its flat faces are
+            written with its `surface` as well.
             Named groups are written as fields of zeros and ones, `group:` and the name; a VTU file gets cells for edges
             and for faces of a solid in groups, where other fields are NaN or -1. PLY has no groups of edges. An MSH file
             has physical groups with these names, and with those of the parts.

@@ -162,7 +162,7 @@ class _Elements(ABC):
 
     @property
     def have_one_point(self) -> bool:
-        """Whether an element's own point is its center."""
+        """Tells whether an element's own point is its center."""
         return False
 
     @abstractmethod

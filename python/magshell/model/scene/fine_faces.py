@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from .solve_inputs import Inputs
     from .values import Values
 
-# [-] Largest error by all faces that do not sample finely, beside some that do, over the one above which some do. With a half
-# the force is off by up to 0.105 % at a gap of a thickness; fixed by
+# [-] Largest error by all faces that do not sample finely, beside some that do, over the one above which some do. With a
+# half the force is off by up to 0.105 % at a gap of a thickness; fixed by
 # test_the_force_of_a_magnet_is_right_to_0_1_percent_at_every_distance and
 # test_the_force_of_a_near_magnet_on_elements_is_right_to_0_1_percent
 _LEFT = 0.2
