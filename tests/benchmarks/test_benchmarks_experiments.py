@@ -139,8 +139,7 @@ def test_a_robots_episode_loses_its_miss() -> None:
     one.reset(seed=0)
     actions = task.middle.reshape(4, -1)
     rewarded = sum(one.step(action)[1] for action in actions)
-    # Resumed steps take other iterations where friction acts, and they end at a tolerance of 1e-4.
-    assert task.lost(rewarded) == pytest.approx(task.objective(task.middle), abs=1e-5)
+    assert task.lost(rewarded) == pytest.approx(task.objective(task.middle), abs=1e-9)
 
 
 def results(ours, theirs, goal):

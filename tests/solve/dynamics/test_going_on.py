@@ -105,6 +105,63 @@ def test_functions_of_the_time_go_on(kind, integrator):
     same_bits(whole, first, second, third)
 
 
+def rubbing_layers(lagged):
+    """Build a sheet on a block: two layers, of which the upper is pulled along over the lower by more than a cell."""
+    lower = ms.meshes.rectangle(0.02, 0.01, cells=(6, 3), irregular=0.2, seed=1)
+    upper = lower.transformed(translation=(1e-3, 5e-4, 5.8e-4))
+    layers = ms.TriangleMesh(
+        np.concatenate([lower.rest_positions, upper.rest_positions]),
+        np.concatenate([lower.faces, upper.faces + lower.n_vertices]),
+    )
+    sheet = ms.Shell(layers, thickness=5e-4, young_modulus=1e6, mass_density=1e3)
+    box = ms.meshes.box((0.02, 0.01, 4e-3), cells=(2, 1, 1)).transformed(translation=(0, 0, -4.58e-3))
+    rubber = ms.NeoHookean(young_modulus=1e6, poisson_ratio=0.4)
+    block = ms.Solid(box, material=rubber, mass_density=1e3, element="linear")
+    law = {
+        "min_distance": 3e-4,
+        "activation_distance": 3e-4,
+        "contact_stiffness": 1e3,
+        "friction_coefficient": 0.5,
+        "lagged_friction": lagged,
+    }
+    pulled = layers.vertices_where(lambda x: (x[:, 2] > 3e-4) & (x[:, 0] > 0.02))
+    return ms.Scene(
+        [sheet, block],
+        supports=[
+            ms.Pin(box.vertices_at(z=-4.58e-3), body=block),
+            ms.Pin(pulled, displacement=(6e-3, 0, 0), body=sheet),
+        ],
+        contacts=[ms.SelfContact(sheet, **law), ms.Contact(sheet, block, **law)],
+        gravity=(0, 0, -50.0),
+        allow_rigid_motions=True,
+    )
+
+
+@pytest.mark.parametrize("integrator", [ms.ImplicitEuler(), None], ids=["ImplicitEuler", "default"])
+@pytest.mark.parametrize("lagged", [False, True], ids=["exact", "lagged"])
+def test_bodies_that_rub_go_on(lagged, integrator):
+    """Check that a step does not depend on which pairs were near each other in the steps before."""
+    scene = rubbing_layers(lagged)
+    steps, factors = 8, np.linspace(0.0, 1.0, 9) ** 2
+
+    def part(begin, end, **start):
+        return ms.simulate(
+            scene,
+            steps=end - begin,
+            time_step=2e-4,
+            support_factor=factors[begin : end + 1],
+            integrator=integrator,
+            stiffness_damping=1e-4,
+            progress=False,
+            **start,
+        )
+
+    whole, first = part(0, steps), part(0, 5)
+    for touch in scene.contacts:
+        assert all(np.abs(whole.contact_state(touch, k).friction).max() > 0.0 for k in (5, 6, 8))
+    same_bits(whole, first, part(5, steps, start=first.end))
+
+
 @pytest.mark.parametrize("rows", [STEPS, STEPS + 1], ids=["a step", "ends"])
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda each: type(each).__name__)
 def test_arrays_begin_with_the_first_step_of_the_part(rows, integrator):
