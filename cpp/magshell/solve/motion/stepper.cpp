@@ -176,8 +176,8 @@ bool Stepper::step(MotionState& state, double dt, bool dissipative,
     if (carries) model.parameters().set_time_varying(load_parameters.front());
     const VectorXd momentum = model.fluid_momentum(state.q, state.v);
     model.set_angle_branches(state.angle_branches);
-    // What contact remembers of earlier steps changes the order of elimination, and so the last bits. The bits of a step depend on the
-    // state at its beginning only; see test_bodies_that_rub_go_on.
+    // The bits of a step depend on the state at its beginning only: the couplings of earlier steps would change the order of elimination.
+    // See test_bodies_that_rub_go_on.
     model.contacts().forget();
     model.begin_step(state.q, load_parameters.front());
     const ScopedStrainHistory elastic_afterwards(model);
