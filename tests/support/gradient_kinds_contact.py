@@ -10,6 +10,8 @@ MESH = ms.meshes.rectangle(0.1, 0.06, cells=(2, 2), diagonals="alternating")
 ABOVE = MESH.transformed(translation=(0.013, 0.007, 1.15e-3))
 RUBS = {"friction_coefficient": 0.3, "static_friction_coefficient": 0.4, "sticking_speed": 5e-3}
 
+_REACH = {**REACH, "rest_positions": 0.02}  # a fifth of the sheets: pairs come near within larger steps
+
 
 def _two_sheets(modulus, **contact):
     lower = ms.Shell(MESH, thickness=1e-3, young_modulus=2 * modulus, poisson_ratio=0.4, mass_density=300.0)
@@ -30,8 +32,7 @@ def sheets_at_rest_on_each_other(**contact) -> Kind:
         contacts=[touch],
         gravity=(0.2, 0.1, -9.81),
     )
-    reach = {**REACH, "rest_positions": 0.02}  # a fifth of the sheets: pairs come near within larger steps
-    return Kind(scene, {"gravity_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, step=5e-5, reach=reach)
+    return Kind(scene, {"gravity_factor": 0.9, "support_factor": 0.8}, fixed=EXACT, step=5e-5, reach=_REACH)
 
 
 def sheets_rubbing(integrator, step=1e-6, **contact) -> Kind:
@@ -50,7 +51,7 @@ def sheets_rubbing(integrator, step=1e-6, **contact) -> Kind:
     velocities[MESH.n_vertices :] = (0.1, 0.05, -0.15)
     inputs = {"velocities": velocities, "time_step": 1e-3, "support_factor": np.linspace(0, 0.7, 6)}
     fixed = {**EXACT, "steps": 6, "integrator": integrator, "progress": False}
-    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=step, reach=REACH)
+    return Kind(scene, inputs, ms.simulate, fixed=fixed, step=step, reach=_REACH)
 
 
 FLAT = ms.meshes.rectangle(0.12, 0.03, cells=(8, 1))

@@ -109,7 +109,9 @@ def bodies_with_own_field(moves: bool) -> Kind:
     )
     inputs = {"applied_flux_density": np.array([1e-3, -2e-3, 3e-3])}
     if not moves:
-        return Kind(scene, inputs, fixed=EXACT, reach=REACH)
+        # Over shorter steps some inputs move these stiff bodies so little that one iteration of Newton's method is enough,
+        # and what it leaves is more than the round-off of others.
+        return Kind(scene, inputs, fixed=EXACT, step=1e-3, reach=REACH)
     fixed = {"steps": 2, "integrator": ms.ImplicitEuler(), "progress": False, **EXACT}
     return Kind(scene, {"time_step": 4e-3, **inputs}, ms.simulate, fixed=fixed, reach=REACH)
 

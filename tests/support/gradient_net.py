@@ -103,7 +103,7 @@ def unit(vector):
 
 
 def noise(name, value: float) -> float:
-    """Return the error of differences due to round-off, of a loss of this value: equilibria are found to a relative 1e-13.
+    """Return the error of differences due to round-off, of a loss of this value: equilibria are found to about 1e-12 of it.
 
     Implicit contact multiplies contact and friction by up to 3.4, and their round-off: 2.2e-5 for 1.9e-5 on x86-64-v2.
     """
