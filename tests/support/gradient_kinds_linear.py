@@ -211,8 +211,8 @@ def snap_together(scene, values, start=None, **given):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ms.FieldSamplingWarning)
         path = ms.follow_path(
-            rest.scene,
-            values={owner: named for owner, named in values.items() if owner is not scene},
+            scene,
+            values=values,
             applied_flux_density=field,
             start=rest,
             first_step=0.03,
@@ -233,7 +233,7 @@ def snapping_flaps() -> Kind:
     n = scene.bodies[0].mesh.n_faces
     magnetization = np.repeat([[2.4e4, 1e3, 0.0], [-2.6e4, 1e3, 0.0]], n, axis=0)
     inputs = {"remanent_magnetization": magnetization, "applied_flux_density": (1e-4, -2e-4, 2e-2)}
-    return Kind(scene, inputs, solve=snap_together, fixed=EXACT, reach=REACH, keeps_shape=True)
+    return Kind(scene, inputs, solve=snap_together, fixed=EXACT, reach=REACH)
 
 
 OF_SHEET = ("thickness", "young_modulus", "poisson_ratio", "mass_density", "curvature_scale")
@@ -257,7 +257,7 @@ def snapping_beam() -> Kind:
         **FACTORS,
     }
     reach = {**REACH, "displacement": 3e-4, "rotation": 0.01, "center": 1e-3}
-    return Kind(scene, inputs, solve=snap, fixed=EXACT, reach=reach, keeps_shape=True)
+    return Kind(scene, inputs, solve=snap, fixed=EXACT, reach=reach)
 
 
 def vibrating_with_own_field() -> Kind:

@@ -257,8 +257,4 @@ def _with_state(
 ) -> Derivatives:
     """Return the derivatives of multiplier . g + eta v . K v, and those by the state that were given in addition."""
     found = system.residual.derivatives(multiplier)
-    return Derivatives(
-        found.by_state + by_state,
-        found.by_values + eta * system.eigenvalue_derivatives.by_values,
-        found.by_load_parameters + eta * system.eigenvalue_derivatives.by_load_parameters,
-    )
+    return found.plus(eta, system.eigenvalue_derivatives)._replace(by_state=found.by_state + by_state)
