@@ -21,6 +21,7 @@ from gradient_net import (
     unit,
 )
 from gradient_scenes import OF_SMALL_SCENES, admissible, label, subject, subjects
+from gradient_shapes import is_bound
 
 import magshell as ms
 
@@ -77,6 +78,27 @@ def test_no_input_is_forgotten_and_each_matters_somewhere():
                 seen.add(subject(kind(name), key))
     missing = sorted(f"{what.__name__}: {name}" for what, name in subjects() - seen)
     assert not missing, missing
+
+
+KEEP_THEIR_SHAPES = {
+    # NoGradient, where supports have turned.
+    "from an equilibrium",
+    "a sheet that responds by linear theory",
+    "a bent sheet that responds by linear theory",
+    "a sheet in a batch of linear responses",
+    # These solves refuse rest positions.
+    "a sheet that vibrates about its rest shape",
+    "a column that buckles by linear theory",
+    "a six-node column that buckles by linear theory",
+}
+
+
+def test_every_other_kind_takes_rest_positions_of_all_its_bodies():
+    for name in MAKERS:
+        scene, values = kind(name).scene, kind(name).of_objects
+        owners = [owner for owner, value in values if value == "rest_positions"]
+        bodies = 1 if is_bound(scene) else len(scene.bodies)
+        assert len(owners) == (0 if name in KEEP_THEIR_SHAPES else bodies), name
 
 
 # The tests below say which input it is that has a wrong gradient: for `make nightly`.

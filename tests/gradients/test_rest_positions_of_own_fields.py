@@ -1,21 +1,20 @@
-"""Gradients by rest positions of bodies that act on each other with their own magnetic field."""
+"""Forces of bodies on each other with their own magnetic field, and their derivatives by rest positions, at any state.
+
+That gradients of equilibria and motions by rest positions are those of differences: test_every_gradient.py.
+"""
 
 import inspect
 
 import numpy as np
 import pytest
-from gradient_kinds import kind
-from gradient_kinds_own_field import bodies_with_own_field, stiff_pair, stiff_pair_magnetization
+from gradient_kinds_own_field import stiff_pair, stiff_pair_magnetization
 from gradient_scenes import OF_SMALL_SCENES
-from test_rest_positions_of_assemblies import weights_of
-from test_rest_positions_of_solids import EXACT, compare, tensor
+from gradient_world import EXACT
 
 import magshell as ms
 from magshell import _core
 from magshell.model.scene.reshaped import neighbour, reshaped
 from magshell.solve.statics.energies_at import _point
-
-torch = pytest.importorskip("torch")
 
 pytestmark = pytest.mark.filterwarnings(*OF_SMALL_SCENES)
 
@@ -160,63 +159,6 @@ def test_own_field_forces_by_rest_positions_agree_with_differences_at_any_state(
 def test_own_field_forces_on_an_even_mesh_have_the_mean_of_the_derivatives_on_both_sides():
     """Check edges of one length, whose larger one is either."""
     check_forces(flaps_apart(8e-3, "stretches"), 0.0)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "two sheets with their own field at rest",
-        "two sheets with their own field in motion",
-        "bodies with their own field at rest",
-        "bodies with their own field in motion",
-        "flaps with their own field that vibrate",
-        "flaps with their own field that buckle",
-    ],
-)
-def test_kinds_of_scene_with_an_own_field_are_compared_with_differences(name):
-    """Check that test_every_gradient.py does not leave them out as kinds without that gradient."""
-    of = kind(name)
-    assert all((body, "rest_positions") in of.entries for body in of.scene.bodies)
-
-
-@pytest.mark.parametrize("moves", [False, True], ids=["at rest", "in motion"])
-def test_gradient_by_rest_positions_of_bodies_in_their_own_field_agrees_with_differences(moves):
-    """Check solids, a skin, a sheet that carries a magnet, and a six-node sheet at rest or a free magnet in motion."""
-    of = bodies_with_own_field(moves)
-    x = away(of.scene, 1e-4)
-    given = {**of.inputs, **of.fixed}
-    if not moves:
-        given["start"] = ms.equilibrium(of.scene, values=values_of(of.scene, x), **given)
-
-    def loss(rest):
-        found = of.function(of.scene, values=values_of(of.scene, rest), **given)
-        displacements = tensor(found.displacements)
-        return 1e3 * (weights_of(x.shape) * (displacements[-1] if moves else displacements)).sum()
-
-    compare(loss, x, step=5e-6)
-    if not moves:
-        return
-    rest = torch.tensor(x, requires_grad=True)
-    (by,) = torch.autograd.grad(loss(rest), rest)
-    along = np.random.default_rng(7).standard_normal(x.shape)
-    _, rate = torch.func.jvp(loss, (torch.tensor(x),), (torch.tensor(along),))
-    assert float(rate) == pytest.approx(float((by.numpy() * along).sum()), rel=1e-6)
-
-
-def test_gradient_by_rest_positions_of_frequencies_in_an_own_field_agrees_with_differences():
-    scene = stiff_pair()
-    x = away(scene, 2e-4)
-    start = flaps(x, scene=scene)
-
-    def loss(rest):
-        found = flaps(rest, scene=scene, start=start)
-        return torch.as_tensor(ms.vibration_modes(found.scene, found, count=1).frequencies).sum()
-
-    compare(loss, x, step=5e-6)
-    rest = torch.tensor(x, requires_grad=True)
-    found = loss(rest)
-    first, again = (torch.autograd.grad(found, rest, retain_graph=True)[0] for _ in range(2))
-    np.testing.assert_allclose(again, first, rtol=0, atol=1e-9 * float(first.abs().max()))
 
 
 @pytest.mark.parametrize("named", [False, True], ids=["all bodies", "named bodies"])
