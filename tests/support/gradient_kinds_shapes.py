@@ -72,7 +72,9 @@ def grown_obtuse_faces() -> Kind:
         flat.rest_positions + 2.0 * x**2 * (0, 0, 1) + 2.5 * y * np.array((1, 0, 0)), flat.faces
     )
     own = {**MATTER, "thickness": 2e-4, "growth": _tensors(mesh.n_faces, 1.01, 0.005)}
-    scene = ms.Scene(ms.Shell(mesh, **own), supports=[ms.Clamp(flat.edges_at(x=0.0))])
+    # Without a weight no modulus of all faces would matter.
+    clamp, weight = ms.Clamp(flat.edges_at(x=0.0)), (0.002, 0.001, -0.01)
+    scene = ms.Scene(ms.Shell(mesh, **own), supports=[clamp], gravity=weight)
     reach = {**REACH, "growth": 0.1, "rest_positions": 1e-3}
     return Kind(scene, {}, fixed=EXACT, reach=reach, step=1e-3)
 
@@ -88,8 +90,9 @@ def lengths_by_default(sliding: bool) -> Kind:
         ms.Spring((sheet, path[1]), (sheet, path[2]), stiffness=2.0),
     ]
     clamp = ms.Clamp(MESH.edges_at(x=0.0))
-    scene = ms.Scene(sheet, supports=[clamp], loads=springs, actuators=[string], **WEIGHT)
-    inputs = {"gravity_factor": 0.3}  # with more the tendon is slack
+    pull = ms.EdgeLoad(MESH.edges_at(x=0.1), (20.0, 0.0, 0.0))  # without it the tendon is slack
+    scene = ms.Scene(sheet, supports=[clamp], loads=[*springs, pull], actuators=[string], **WEIGHT)
+    inputs = {"gravity_factor": 0.9}
     return Kind(scene, inputs, fixed=EXACT, reach=REACH, by_default=("rest_length", "ground"))
 
 
