@@ -130,6 +130,15 @@ class FieldSamplingWarning(UserWarning):
     """
 
 
+class ResolutionWarning(UserWarning):
+    """A warning about an equilibrium in which more than a tenth of a sheet's elastic energy is an error of its mesh.
+
+    ms.equilibrium estimates that part of each sheet of three-node faces by how strains differ from face to face (Zienkiewicz
+    and Zhu 1987), in the first, the second, the fourth, ... equilibrium of a scene, so that many cost little more.
+    ms.error_estimate estimates the error of one number, for the work of several solves.
+    """
+
+
 class LinearTheoryWarning(UserWarning):
     """A warning about a linear solve whose displacements are not small, as linear theory takes them to be.
 

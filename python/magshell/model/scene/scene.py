@@ -231,6 +231,7 @@ class Scene(PlotMixin):
         self._warned_of_strain = 0.0
         self._warned_of_dear_steps = False
         self._warned_of_jumps = False
+        self._n_equilibria = 0
         self._warned_of_gains = False
         self._warned_of_units: set[str] = set()
         self._cores = CoreModels(self._new_model(), self._new_model)

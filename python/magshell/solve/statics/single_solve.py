@@ -12,6 +12,7 @@ import numpy as np
 from ... import _core
 from ..._input.scalars import flag
 from ..._input.tensors import dtype_like, is_tensor, like
+from ..._runtime.frozen import remember
 from ..._runtime.keywords import FACTORS
 from ..._runtime.log import log
 from ..._runtime.progress import stop_at_once
@@ -19,6 +20,7 @@ from ..._runtime.solve_keywords import names_of
 from ...errors import Interrupted, NotConverged
 from ...model.contact.contacts_to_core import check_apart
 from ...model.contact.watched_obstacles import watched_obstacles
+from ...model.results.resolution import unresolved, warn_of_resolution
 from ...model.scene.field_sampling import (
     element_errors,
     is_suspect,
@@ -46,6 +48,7 @@ from .start import Origin, starting_point
 
 if TYPE_CHECKING:
     from ..._input.kinds import Starting
+    from ...model.scene.values import Values
 
 
 # Largest number of repeated searches, each with more faces that sample the field finely than the one before; one is
@@ -218,6 +221,7 @@ def solve(
         scene, positions, inputs.values.all_shells, result._energies.get("bending", 0.0), "this equilibrium"
     )
     warn_if_large(result, result._largest_strains, "the equilibrium")
+    _check_resolution(inputs.values, found)
     layout = scene._load_parameter_layout
     field_factor = float(layout.of(found.load_parameters, "scene", "field_factor")[0])
     flux_density = layout.of(found.load_parameters, "scene", "applied_flux_density")[0]
@@ -233,6 +237,18 @@ def solve(
     except KeyboardInterrupt as stopped:
         raise Interrupted("interrupted while the sampling of the field was checked", result) from stopped
     return Solution(result, found, inputs)
+
+
+def _check_resolution(values: Values, found: _core.StaticsResult) -> None:
+    """Warn of a mesh that is too coarse, in the first, the second, the fourth, ... equilibrium of a scene."""
+    scene = values.scene
+    count = scene._n_equilibria + 1
+    remember(scene, _n_equilibria=count)
+    if count & (count - 1) == 0:
+        flux_density = scene._load_parameter_layout.of(
+            found.load_parameters, "scene", "applied_flux_density"
+        )[0]
+        warn_of_resolution(unresolved(values, found.state), values, flux_density, "this equilibrium")
 
 
 def _with_fine_faces_at_end(
