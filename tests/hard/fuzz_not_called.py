@@ -56,6 +56,7 @@ NOT_CALLED = {
     "StepErrorWarning": "a warning",
     "FieldSamplingWarning": "a warning",
     "LinearTheoryWarning": "a warning",
+    "ResolutionWarning": "a warning",
     "SusceptibilityWarning": "a warning",
     "MeshGroupWarning": "a warning",
     "MeshQualityWarning": "a warning",

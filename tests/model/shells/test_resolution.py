@@ -55,7 +55,7 @@ def bent_in_its_plane(cells):
 
 
 def on_a_bed(edges):
-    """Return a long plate on a bed, loaded at its end, with edges of that many (D/k)^(1/4), and its deflection there over the
+    """Return a long plate on a bed, loaded at its end, with edges of that many (D/k)^(1/4), and its deflection over the
     exact one.
     """
     bed = 1e5
