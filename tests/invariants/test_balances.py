@@ -1,4 +1,4 @@
-"""Every motion keeps momentum; its angular momentum and energy are balanced to the order of the method."""
+"""The balance of momentum closes to the tolerance of the solver, the others to the order of the method."""
 
 import warnings
 from functools import cache
@@ -15,8 +15,8 @@ STEPS = {
     "ImplicitEuler": 640
 }  # of 6 us; of the other methods 80 of 50 us. The shortest waves of the sheets take 0.3 ms.
 FLOOR = 1e-8  # of what moved: the tolerance of the solver, over all steps
-BELOW_ORDER = 0.5  # how much less the order seen may be, at steps that are not infinitely short
-# The table of what is not held, {(what, scene): why}. These tests fail when it is held, so that the table is kept true.
+BELOW_ORDER = 0.5  # how much less the observed order may be at finite steps
+# Known failures, {(what, scene): why}. The tests fail when one of them holds, so that the table is kept true.
 NOT_HELD = {
     (
         "energy",

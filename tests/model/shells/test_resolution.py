@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import magshell as ms
-from magshell.model.results.resolution import unresolved
+from magshell.model.results.resolution import _corners, unresolved
 
 YOUNG, THICKNESS = 1e6, 1e-3
 STIFFNESS = YOUNG * THICKNESS**3 / 12.0  # of a plate, N m
@@ -130,7 +130,7 @@ def test_lengths_of_beds_and_fields_are_named():
     body = sheet(mesh, remanent_magnetization=(magnetization, 0, 0))
     scene = ms.Scene(body, supports=[ms.Clamp(mesh.edges_at(x=0.0))], field=ms.UniformField())
     _, [text] = solved(scene, applied_flux_density=(0, 0, flux))
-    assert "the field bends it over (D/MBh)^(1/2) = 0.0091 m" in text
+    assert "the field bends it over (D/(M B h))^(1/2) = 0.0091 m" in text
 
 
 def test_strains_that_jump_as_they_should_are_not_errors():
@@ -146,6 +146,14 @@ def test_strains_that_jump_as_they_should_are_not_errors():
     couple = ms.EdgeCouple(mesh.edges_at(x=0.04), 5e-6)
     rest, told = solved(ms.Scene(creased, supports=[ms.Clamp(mesh.edges_at(x=0.0))], loads=[couple]))
     assert fraction(rest) < 0.02 and not told
+
+
+def test_averages_cross_a_crease_at_its_end_only():
+    mesh = ms.meshes.rectangle(0.04, 0.02, cells=(8, 4))
+    middle = mesh.edges_at(x=0.02)
+    half = middle[np.argsort(mesh.edge_midpoints[middle, 1])[:2]]
+    body = sheet(mesh, creases=[ms.Crease(half, stiffness=1e-5)])
+    assert len(np.unique(_corners(body, body))) == mesh.n_vertices + 2
 
 
 def test_sheets_at_rest_and_six_node_sheets_have_no_estimate():

@@ -1,4 +1,4 @@
-"""What an error says to do about a step that failed, and tangents that a batch has not."""
+"""Errors of steps that failed name what to do, and those of batches the tangents that there are none of."""
 
 import numpy as np
 import pytest

@@ -11,8 +11,8 @@ namespace {
 
 using BalanceRows = MotionBalance::Rows;
 
-// [-] Step of the central differences of energies by parameters that change, over their change in a time step; see
-// test_work_of_a_moving_magnet.
+// [-] Step of the central difference of an energy with respect to the parameters that vary in time, as a fraction of their
+// change in a time step; see test_work_of_a_moving_magnet.
 constexpr double difference = 1e-3;
 
 // The derivatives, times the length of a step, of the polynomial through its parameters, at the times of its beginning (0) and of its
@@ -48,14 +48,14 @@ class Accountant {
 
     Stepper& stepper() { return stepper_; }
 
-    /// Returns the sums until now, and the energies at this state.
+    /// Returns the sums so far, and the energies at this state.
     MotionBalance::State state(const MotionState& at, const LoadParameters& load_parameters);
     /// Adds the work and the impulses of a step from record.begin to `end`.
     void add(const StepAlgebra& step, const SubstepRecord& record, const MotionState& end,
              std::span<const LoadParameters> load_parameters);
 
   private:
-    // The rates of all sums in one state: work, force and moment. reactions: what supports, joints and motors add to the other
+    // The rates of all sums in one state, in columns: power, force (3), moment (3). reactions: what supports, joints and motors add to the other
     // forces, on all dofs.
     struct Rates {
         BalanceRows forces;
@@ -93,8 +93,8 @@ class Accountant {
     // Evaluates implicit contact at the end of a step.
     Rates contact_rates(const Instant& at, const VectorXd& mean_velocity, const VectorXd& by_contact);
     void add_viscous(const Instant& at, const StrainRates& elastic, const StrainRates& joints, Rates& to);
-    // Adds what follows from the momentum that a force carries, which counts as the scene's: the force leaves its energy as
-    // it is, and at a node it has the moment of v x p besides that of its rate.
+    // Adds the momentum of the fluid, whose momentum and energy count as the scene's: the force that only moves energy between
+    // body and fluid does no work, and v x p is a part of the moment of a node.
     void add_fluid(const Instant& at, Rates& to);
     // Adds the work of parameters that change by `change` on the energies, without or with only implicit contact, and that of
     // the motors and directions that follow them.
@@ -222,7 +222,7 @@ void Accountant::add_viscous(const Instant& at, const StrainRates& elastic, cons
             sum.add(law.stiffness_damping, stress);
         }
         for (std::size_t k = 0; k < law.branches.size(); ++k) {
-            // With e' = (d - e)/tau
+            // With e' = (d - e)/tau, the stress of the branch is that of tau e'.
             const StrainSet stress = terms.stresses(elastic.e[k].times(law.branches[k].time));
             to.forces(further(MotionBalance::maxwell), 0) -=
                 law.branches[k].modulus * stress.dot(elastic.e[k]);
@@ -353,10 +353,8 @@ void Accountant::add(const StepAlgebra& step, const SubstepRecord& record, const
     if (model_.capabilities().has_own_viscosity)
         add_strain_rates(step, record, load_parameters, damper_law, model_.dampers(), &StageRates::joints, {},
                          at.all);
-    model_.linearize(begin.q);
+    set_state(begin.q, begin.angle_branches, load_parameters.front());
     const Eigen::Vector4d held_before = held_inertia(begin.q, begin.v);
-    model_.set_angle_branches(begin.angle_branches);
-    model_.parameters().set_time_varying(load_parameters.front());
     model_.begin_step(begin.q, load_parameters.front());
     const Eigen::MatrixXd derivatives = polynomial_derivatives(tableau);
     const auto change_at = [&](int point) {
@@ -372,7 +370,8 @@ void Accountant::add(const StepAlgebra& step, const SubstepRecord& record, const
         const Model::AngleBranches& branches =
             begins ? begin.angle_branches : record.stages[point - 1].angle_branches;
         const VectorXd &v = at.all[j].v, &acceleration = at.all[j].acceleration;
-        // Free bodies begin with other rates than those at the end of the step before (FreeFlight::finish).
+        // Free bodies begin with other rates than those at the end of the step before, which are of no use then
+        // (FreeFlight::finish).
         const bool is_known = begins && last_.reactions.size() > 0 && stepper_.free_bodies().empty();
         if (!is_known) {
             const double T = step.stage_time();

@@ -8,7 +8,7 @@
 namespace magshell {
 namespace {
 
-// Returns the first t in (0, longest] at which c[0] + c[1] t + c[2] t^2 + c[3] t^3 vanishes; `longest` if it
+// Returns the first t in (0, longest] at which the cubic c[0] + c[1] t + c[2] t^2 + c[3] t^3 vanishes; `longest` if it
 // stays positive, 0 if c[0] is not positive.
 double first_root(const double c[4], double longest) {
     const auto value = [&](double t) { return c[0] + t * (c[1] + t * (c[2] + t * c[3])); };
@@ -126,9 +126,9 @@ std::string Tetrahedra<Element>::invalid_state_reason(const double* q) const {
             const SimdDouble j = determinant(f, cofactor(f));
             for (int lane = 0; lane < loop_.lanes_in(group); ++lane) {
                 const Index user = solid_.elements.user[loop_.element(group, lane)];
-                if (j[lane] > 0.0 || user >= first) continue;
+                if (j[lane] > 0.0 || user > first) continue;
+                least = user == first ? std::min(least, j[lane]) : j[lane];
                 first = user;
-                least = j[lane];
             }
         }
     }
@@ -388,8 +388,8 @@ RestModuli Tetrahedra<Element>::viscous_work_by_moduli(Index group, int p, const
     return by;
 }
 
-// The viscous power is V S : sym(F^T L) with the stresses S of d = (scale - 1) E - shift. The shift is that of earlier states
-// (strains_vjp).
+// The viscous power is V S : sym(F^T L) with the stresses S of d = (scale - 1) E - shift. The shift comes from earlier states;
+// strains_vjp differentiates it.
 template <class Element>
 SimdMat3 Tetrahedra<Element>::viscous_by_rest(Index group, int p, const SimdMat3& f,
                                               const SimdMat3& along) const {

@@ -1,15 +1,15 @@
-// Tetrahedra: the elements of a solid, all of one kind: their reference shapes, strains, viscosity and admissible steps, and
-// what follows from the response of a material at their points. terms/solid/tetrahedra_term.h has the energy of a material,
-// its forces and its Hessian, which are compiled for each material.
+// Tetrahedra: the elements of a solid, all with four or all with ten nodes. This class has everything that is compiled once
+// for all materials: reference shapes, strains, viscosity, admissible steps, and derivatives that need only the response of
+// the material at a point. terms/solid/tetrahedra_term.h adds the energy of a material, its forces and its Hessian.
 //
-//   E = sum over elements  sum_p V_p W(F_p)           W = w + U(v), v the material's measure of volume
-//   mean:                  sum_p V_p w(F_p) + V U(v^), v^ = sum_p V_p v_p / V
+//   E = sum over elements  sum_p V_p W(F_p)           W = w + U(v), v the volume measure of the material, such as J
+//   with a mean volume:    sum_p V_p w(F_p) + V U(v^),   v^ = sum_p V_p v_p / V,   V = sum_p V_p
 //
 // A deformation I + H of the rest shape at a point, H = sum_k dX_k (x) g_k, changes
 //
 //   dF = - F H,   dL = - L H,   dV = V tr H          L the rate of F along lambda
 //
-// so that the power V P : L of the stresses has the derivative with respect to H
+// with V = V_p from here on, so that the power V P : L of the stresses has the derivative with respect to H
 //
 //   B = V ((P : L) I - F^T (dP/dF : L) - L^T P)      dW/dX_k = sum over points  B g_k
 //
@@ -93,8 +93,8 @@ class Tetrahedra : public SolidTerm, public ElementEnergies, public RestShapeTer
     void vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) override;
     void add_rest_vjp(const double* q, const LoadParameters&, const double* lambda, VectorXd& out) override;
 
-    // With Green's strain E, d2E is the same at all states. So the Hessian of held stresses V S' has no derivative, and that of
-    // W = sum_p V S : c is one of the power P : L for the rates L = F^-T c, whose strain rate is c.
+    // Green's strain E is quadratic in q, so d2E is the same at all states, and the Hessian of frozen stresses V S' does not
+    // depend on q. The sum of V S : c is the power of the rates L = F^-T c, whose strain rate is c; L follows the rest shape.
     void freeze_stress_rates(const double* p) override;
     void release_stresses() override { frozen_.reset(); }
     bool has_stress_work_vjp() const override { return true; }
@@ -131,12 +131,12 @@ class Tetrahedra : public SolidTerm, public ElementEnergies, public RestShapeTer
     /// Adds the derivatives by parameters of the power sum_p V_p P_p : L_p.
     virtual void add_work_vjp(const double* q, const Rates& rates, Gradient& out) const = 0;
     virtual RestModuli rest_moduli(Index group) const = 0;
-    /// Returns a bound of the stiffness [Pa] for add_projective_stiffness().
+    /// Returns the weight [Pa] for add_projective_stiffness(), which bounds the stiffness.
     virtual SimdDouble projective_weight(Index group) const = 0;
-    /// Returns a modulus [Pa] of the size of the forces' stiffness, for bounds of round-off.
+    /// Returns a typical modulus [Pa], from which round-off is estimated.
     virtual double size_of_modulus(Index element) const = 0;
 
-    /// Returns whether the volumetric energy is evaluated at the mean volume of an element. It is asked when the program runs, as an
+    /// Returns whether the volumetric energy is evaluated at the mean volume of an element. It is a question at run time, as an
     /// element with a mean and one without are nearly the same code, and each takes long to compile.
     bool mean() const { return points > 1 && has_mean_; }
 
@@ -151,7 +151,7 @@ class Tetrahedra : public SolidTerm, public ElementEnergies, public RestShapeTer
         for (int p = 0; p < points; ++p) f[p] = gradient_of(group, p, x);
     }
 
-    // Computes force_k += stress g_k.
+    // Computes force_k += stress g_k; at the first point it begins with zero forces. g returns the gradients.
     void add_pull(Index group, int p, const SimdMat3& stress, SimdVec3 g[N], SimdVec3 force[N]) const {
         Element::gradients(rest_[group].gradients[p], p, g);
         SimdVec3 sum{SimdDouble(0.0), SimdDouble(0.0), SimdDouble(0.0)};
@@ -163,12 +163,12 @@ class Tetrahedra : public SolidTerm, public ElementEnergies, public RestShapeTer
         force[0] = p == 0 ? -sum : force[0] - sum;
     }
 
-    // Removes what the mean volume would lock.
+    // With a mean volume viscosity resists shear only: a bulk viscosity at every point would lock the element.
     RestModuli viscous(RestModuli moduli) const {
         if (mean()) moduli.lambda = SimdDouble(-2.0 / 3.0) * moduli.mu;
         return moduli;
     }
-    // Computes (scale - 1) d - shift at a point.
+    // Computes the strain whose stress is viscous, (scale - 1) d - shift, at a point.
     void beyond_elastic(Index group, int p, const SimdMat3& f, SimdDouble d[6]) const {
         ViscousStrain::at(f, d);
         const SimdDouble* shift = this->history_.shift->at(group) + 6 * p;

@@ -3,11 +3,12 @@
 Strains of three-node faces are constant in each. Their averages at the vertices, interpolated in the faces, are nearer to
 the true strains, so that the energy of the difference estimates that of the error [Zienkiewicz87]:
 
-    e = sum over faces  int (N - N*) : (E - E*) + (M - M*) : (K - K*) dA,   over that of N, E, M and K plus e
+    e = sum over faces  int (N - N*) : (E - E*) + (M - M*) : (K - K*) dA,   relative to the same sum of N : E + M : K, plus e
 
-of membrane forces N, strains E, moments M, curvatures K and their averages N*, ... A displacement under the loads is off by
-about as much: too small if membranes do not follow, often too large if curvatures do not. Averages end at folds, at creases
-and where the thickness or Young's modulus jumps, as strains jump there. Six-node faces do not take part.
+of membrane forces N, strains E, moments M, curvatures K and their averages N*, ... Displacements under loads are off by
+about as much: too small by membrane locking, often too large where curvatures are not resolved. Averages at a vertex do not
+cross folds, creases and edges where the thickness or Young's modulus jumps, as strains jump there. Six-node faces do not
+take part.
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ if TYPE_CHECKING:
     from ..scene.values import Values
 
 # [-] Estimated part of the energy above which a warning is given. Where it is 1 to 20 %, displacements are off by 0.4 to 1.5
-# times as much; it saturates at a third. Fixed by test_estimate_is_near_the_error_of_displacements.
+# times as much; it does not exceed about a third. Fixed by test_estimate_is_near_the_error_of_displacements.
 TRUSTED = 0.1
-_SMOOTH = np.cos(np.radians(30.0))  # [-] of the angle between two normals, below which their edge is a fold
+_SMOOTH = np.cos(np.radians(30.0))  # [-] of the largest angle between the normals at an edge that is no fold
 _SAME = 1.01  # [-] ratio of thickness or Young's modulus across an edge, above which strains jump there
-_ROUND_OFF = 1e-9  # [-] largest strain below which it is round-off
-_LEFT = 0.01  # [-] error after what a warning advises
+_ROUND_OFF = 1e-9  # [-] strains below this are round-off
+_LEFT = 0.01  # [-] error fraction that the advised mesh should reach
 _MOST_NAMED = 4  # faces in a warning
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of a symmetric tensor's six components
 
@@ -41,7 +42,7 @@ _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of a symmetric tenso
 class Unresolved(NamedTuple):
     """The part of the elastic energy of a shell that its mesh does not resolve.
 
-    membrane, bending: by membrane strains and by curvatures (1). by_face: (n_f,), the shares of the faces; they add up to
+    membrane, bending: by membrane strains and by curvatures. by_face: (n_f,), the shares of the faces; they add up to
     the sum of both.
     """
 
@@ -65,7 +66,7 @@ def unresolved(values: Values, state: np.ndarray) -> list[Unresolved]:
 def warn_of_resolution(
     found: list[Unresolved], values: Values, flux_density: np.ndarray | None, where: str
 ) -> None:
-    """Warn of the shell whose mesh leaves the largest part of its energy unresolved, if that is more than a tenth.
+    """Warn of the shell whose mesh leaves the largest part of its energy unresolved, if that is more than TRUSTED.
 
     flux_density: (3,) T, the uniform one, or None. where: the result, in words.
     """
@@ -75,16 +76,15 @@ def warn_of_resolution(
     fraction = worst.membrane + worst.bending
     of_membrane = worst.membrane > worst.bending
     what = (
-        "membrane strains, as those of a strip that bends in its own plane" if of_membrane else "curvatures"
+        "membrane strains, such as those of a strip that bends in its plane," if of_membrane else "curvatures"
     )
     faces = ", ".join(map(str, np.argsort(-worst.by_face, kind="stable")[:_MOST_NAMED].tolist()))
     lengths = "" if of_membrane else _lengths_in_words(worst.body, values, flux_density)
     warnings.warn(
         ResolutionWarning(
-            f"{where}: the faces of {worst.body!r:.80} are too large for its {what}: an estimated "
-            f"{fraction:.0%} of its elastic energy is error, and displacements are off by about as much, most at faces "
-            f"{faces}{lengths}. Take a mesh of six-node elements (`order=2`), or edges "
-            f"{np.sqrt(fraction / _LEFT):.2g} times shorter"
+            f"{where}: the mesh of {worst.body!r:.80} is too coarse to resolve its {what} most at faces {faces}. An "
+            f"estimated {fraction:.0%} of its elastic energy is error, and displacements are off by about as much{lengths}. "
+            f"Take a mesh of six-node elements (`order=2`), or edges {np.sqrt(fraction / _LEFT):.2g} times shorter"
         ),
         stacklevel=callers_level(),
     )
@@ -98,7 +98,8 @@ def _lengths_in_words(body: Shell, values: Values, flux_density: np.ndarray | No
     for each in values.scene.loads:
         if isinstance(each, ElasticFoundation) and each.body in (None, body):
             faces = slice(None) if each.faces is None else each.faces
-            of_faces = np.broadcast_to(stiffness, (mesh.n_faces,))[faces] / values.current(each).stiffness
+            with np.errstate(divide="ignore"):
+                of_faces = np.broadcast_to(stiffness, (mesh.n_faces,))[faces] / values.current(each).stiffness
             lengths.append(("its foundation bends it over (D/k)^(1/4)", float(of_faces.min()) ** 0.25))
     if flux_density is not None and now.remanent_magnetization is not None:
         couple = (
@@ -107,7 +108,7 @@ def _lengths_in_words(body: Shell, values: Values, flux_density: np.ndarray | No
         if np.max(couple) > 0.0:
             with np.errstate(divide="ignore"):
                 lengths.append(
-                    ("the field bends it over (D/MBh)^(1/2)", float(np.min(stiffness / couple)) ** 0.5)
+                    ("the field bends it over (D/(M B h))^(1/2)", float(np.min(stiffness / couple)) ** 0.5)
                 )
     longest = float(mesh.edge_lengths.max())
     told = [f"{what} = {length:.2g} m" for what, length in lengths if longest > 0.5 * length]
@@ -130,7 +131,7 @@ def _estimate(body: Shell, now: Shell, tensors: tuple[np.ndarray, ...]) -> Unres
     weights = np.bincount(corners.ravel(), at_corners)
 
     def differences(tensor: np.ndarray) -> np.ndarray:
-        """Return those to the averages at the corners, and their sum, (6, n_f, 4)."""
+        """Return the averages at the corners less the tensor, with their sum as fourth column, (6, n_f, 4)."""
         mean = [np.bincount(corners.ravel(), at_corners * np.repeat(each, 3)) / weights for each in tensor]
         off = np.stack(mean)[:, corners] - tensor[:, :, None]
         return np.concatenate([off, off.sum(axis=2, keepdims=True)], axis=2)
@@ -166,7 +167,7 @@ def _product_in_plane(one: np.ndarray, other: np.ndarray, normal: np.ndarray) ->
 
 
 def _corners(body: Shell, now: Shell) -> np.ndarray:
-    """Return numbers of the corners of faces, (n_f, 3), equal where faces meet at a vertex and strains do not jump there."""
+    """Return numbers of the corners of faces, (n_f, 3), equal where faces meet at a vertex and strains do not jump."""
     mesh = body.mesh
     one, other = mesh.edge_faces.T
     smooth = np.flatnonzero((one >= 0) & (other >= 0))
@@ -179,8 +180,8 @@ def _corners(body: Shell, now: Shell) -> np.ndarray:
     for each in (now._face_thickness, young_modulus):
         ratios = each[one[smooth]] / each[other[smooth]]
         smooth = smooth[np.maximum(ratios, 1.0 / ratios) < _SAME]
-    patches = connected_groups(mesh.n_faces, mesh.edge_faces[smooth])
-    if not patches.any():
-        return mesh.faces
-    numbers = mesh.faces.astype(np.int64) * (patches.max() + 1) + patches[:, None]
-    return np.unique(numbers, return_inverse=True)[1].reshape(-1, 3)
+    # The corners of two faces at either end of a smooth edge are one.
+    around = mesh.faces[mesh.edge_faces[smooth]]  # (k, 2 faces, 3)
+    at = [np.argmax(around == mesh.edges[smooth][:, None, [end]], axis=2) for end in (0, 1)]
+    pairs = np.concatenate([3 * mesh.edge_faces[smooth] + each for each in at])
+    return connected_groups(3 * mesh.n_faces, pairs).reshape(-1, 3)
