@@ -215,6 +215,7 @@ def test_the_loop_takes_time():
     assert 1e-3 < module.loop(rounds=2) < 1e4
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning", "ignore::magshell.MeshQualityWarning")
 def test_quickest_form_runs_every_part_and_nothing_is_worse_than_in_the_last_release(capsys):
     """Limit the run to counts and errors, which do not depend on other load: half a minute of one idle core."""
     pytest.importorskip("torch")

@@ -13,6 +13,7 @@ def test_backpropagation_improves_the_policy_within_a_few_episodes():
     assert curve.returns[1] > curve.returns[0] + 1.0
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_ppo_improves_the_policy_within_a_few_updates():
     size = EPISODE * EPISODES_PER_UPDATE
     curve = by_ppo(3 * size, test_every=3)

@@ -66,6 +66,7 @@ def test_gradients_part_prints_and_writes(tmp_path, capsys) -> None:
     assert all(cost["share"] == cost["gradient"] / cost["equilibrium"] for cost in results.values())
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_dynamics_part_prints_and_writes(tmp_path, capsys) -> None:
     pytest.importorskip("torch")
     results = run("dynamics", tmp_path, "--quick", "--long", "200")
@@ -173,6 +174,7 @@ def test_parts_of_a_scene_add_up() -> None:
 PAPER = ["bending_twisting", "hexagram", "kirigami_reaching", "kirigami_tower", "letters"]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning", "ignore::magshell.StepErrorWarning")
 def test_paper_part_prints_and_writes(tmp_path, capsys) -> None:
     pytest.importorskip("torch")
     results = run("paper", tmp_path, "--iterations", "2", "--only", *PAPER, rounds=False)

@@ -205,6 +205,7 @@ def thread_counts():
     ms.set_num_threads(before)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 @pytest.mark.parametrize("bending", BENDINGS)
 def test_any_number_of_threads_gives_the_same_bits(bending, thread_counts, rng):
     mesh = ms.meshes.rectangle(0.1, 0.03, cells=(100, 16), irregular=0.2)  # several parts a colour

@@ -118,6 +118,7 @@ def walked(controls, window):
     return 1e-3 * (controls**2).mean() - way * (STEPS / window.steps)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_windows_take_a_walker_farther_than_one_search_of_as_many_steps() -> None:
     start = zeros(STEPS, 2)
     start[:, 1] = 0.3 * torch.sin(torch.arange(STEPS) * 2 * np.pi / 20)

@@ -100,6 +100,7 @@ def test_starts_lose_nothing_with_a_worker_and_are_stored(cluster, killing, tmp_
         np.testing.assert_array_equal(one.result[1], positions)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_episodes_lose_nothing_with_a_worker(cluster, killing):
     pytest.importorskip("gymnasium")
     waves = np.random.default_rng(1).uniform(-1.0, 1.0, (6, 3, 3))

@@ -27,6 +27,12 @@ def blocks(page: Path) -> list[str]:
     return [code for kind, code in FENCE.findall(page.read_text()) if kind == "python"]
 
 
+@pytest.mark.filterwarnings(
+    "ignore::magshell.LargeStrainWarning",
+    "ignore::magshell.MeshQualityWarning",
+    "ignore::magshell.StepErrorWarning",
+    "ignore::magshell.UnitWarning",
+)
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=name_of)
 def test_code_of_a_page_runs(page, tmp_path, monkeypatch) -> None:
     for library in (

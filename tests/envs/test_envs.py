@@ -49,6 +49,7 @@ def episode(one, actions, seed=3):
     return np.array(seen), np.array(rewards)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("name", [*robots.REGISTERED, *environments.REGISTERED])
 def test_registered_robots_pass_gymnasiums_own_check(name):
     made = gymnasium.make(name, render_mode="rgb_array")
@@ -127,6 +128,7 @@ def test_options_of_reset_come_first():
         one.reset(options={"positions": rest})
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("context", ["fork", "spawn"])
 def test_processes_give_the_same_bits(context):
     actions = np.random.default_rng(1).uniform(-1, 1, (3, 2, 3))

@@ -18,6 +18,7 @@ def test_mesh_has_the_papers_faces_and_vertices() -> None:
     assert (mesh.n_faces, mesh.n_vertices) == (2048, 1097)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_damping_is_the_papers_on_its_mesh_and_the_same_in_all_on_another(result) -> None:
     assert model.strip().damping == 1e-4
     assert result["strip"].damping * result["strip"].mesh.n_vertices == pytest.approx(1e-4 * 1097, rel=1e-12)

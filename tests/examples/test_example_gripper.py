@@ -15,6 +15,7 @@ def result(example) -> dict:
     return example.main(iterations=4, steps=120)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_the_search_closes_the_arms(result, example) -> None:
     design = result["design"]
     assert design["objective"] < 0.2 * design["history"][0]

@@ -20,6 +20,7 @@ def last(identified, name) -> dict:
     return identified[name]["stages"][-1]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_modulus_and_magnetization_are_found(identified) -> None:
     noisy = last(identified, "noisy")
     assert noisy["decades"] < 0.15

@@ -63,6 +63,7 @@ def test_arms_are_magnets_along_themselves(parts) -> None:
     assert not vectors[5].any()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_starfish_takes_off_by_the_stroke_of_its_arms(result) -> None:
     """Check that the starfish takes off: its arms' stroke lifts it, and friction pushes it ahead."""
     found = result["found"]

@@ -40,6 +40,7 @@ def test_all_legs_have_the_same_shape() -> None:
         np.testing.assert_allclose(sizes, sizes[0], rtol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_waves_are_found_that_take_it_to_the_target(swum) -> None:
     found = swum["found"][0]
     assert found.controls.size == 30 * 64 and np.abs(found.controls).max() <= 1

@@ -19,6 +19,7 @@ def swim(example) -> dict:
     return example.main(channels=("pipe I",), steps=250, goal=1.5e-3, noise=1e-12)["pipe I"]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_the_mesh_is_as_large_as_the_papers(swim) -> None:
     body = swim["body"]
     assert (body.mesh.n_faces, body.mesh.n_vertices) == (492, 313)

@@ -10,6 +10,7 @@ def relaxed() -> dict:
     return load("relaxation_fit").main(cells=(2, 1, 1))
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 def test_measured_force_is_fitted_by_two_branches(relaxed) -> None:
     assert relaxed["rms"][2] < 1.5e-3
     assert 4e-3 < relaxed["rms"][1] < 1e-2

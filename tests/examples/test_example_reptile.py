@@ -38,6 +38,7 @@ def test_the_paper_s_mesh_and_a_magnetization_that_adds_up_to_nothing(parts) -> 
     assert np.abs(total).max() < 1e-12 * (mesh.face_areas[:, None] * np.abs(magnetization)).sum()
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_crawler_walks_ahead_and_uphill(parts, result) -> None:
     flat, slope = (advance(parts, result["walks"][name])[0] for name in ("flat", "slope"))
     assert flat == pytest.approx(3.2e-3, rel=0.05)

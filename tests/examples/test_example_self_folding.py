@@ -15,6 +15,7 @@ def result(example) -> dict:
     return example.main(opening=6)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 def test_the_own_field_holds_the_fold_when_the_field_ends(result) -> None:
     own, without = result[True], result[False]
     for one in result.values():

@@ -16,6 +16,7 @@ def _sums(result) -> dict[str, float]:
     return {name: 1e3 * design["heights"].sum() for name, design in result["designs"].items()}
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_topology_and_magnetization_together_lift_more_than_each_alone(result) -> None:
     sums = _sums(result)
     assert sums["both"] > sums["magnetization alone"] + 0.5
@@ -48,6 +49,7 @@ def test_sharp_designs_do_not_swing_between_two_forms(result) -> None:
     assert np.abs(np.diff(sums)).mean() < 6e-3 * sums[-1]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_heights_of_the_last_search_are_those_of_a_solve_from_the_flat_sheet(result) -> None:
     """Check that the design stands where it was found, without the starts of the search."""
     design, arm = result["designs"]["both"], example.Arm((24, 12))

@@ -45,6 +45,7 @@ def test_both_curves_lead_from_the_same_point_to_the_same_point(model) -> None:
     assert (corner.length, arc.length) == pytest.approx((16e-3, 4e-3 * np.pi))
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 def test_splines_pass_below_the_paper_s_residuals(tracks, model) -> None:
     for name, by_method in tracks["fits"].items():
         for method in ("spline", "ours"):

@@ -14,16 +14,19 @@ import magshell as ms
 SCENES = int(os.environ.get("MAGSHELL_CONTACT_SCENES", "30"))
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning", "ignore::magshell.UnitWarning")
 @pytest.mark.parametrize("seed", range(SCENES))
 def test_a_random_contact_ends_well(seed) -> None:
     assert verdict(seed) is None
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning", "ignore::magshell.UnitWarning")
 @pytest.mark.parametrize("seed", range(SCENES // 3))
 def test_a_random_contact_ends_well_if_contact_is_implicit(seed) -> None:
     assert verdict(seed, ms.TRBDF2(implicit_contact=True)) is None
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @pytest.mark.parametrize("seed, most", [(63, 29), (86, 43), (33, 27), (13, 138)])
 def test_a_stage_with_contact_wastes_few_factorizations(seed, most) -> None:
     """Count factorizations per step.

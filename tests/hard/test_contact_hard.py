@@ -203,6 +203,7 @@ def knotted(width, cells) -> ms.TetMesh:
     return ms.TetMesh(points, straight.tetrahedra)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 def test_a_knot_pulled_tight():
     """Draw the ends of a knotted cord apart to nearly three times their distance."""
     mesh = knotted(0.003, 80)

@@ -96,6 +96,7 @@ def ms_rotation(rng):
     return np.linalg.qr(rng.normal(size=(3, 3)))[0]
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("seed", range(25))
 def test_random_shapes_keep_the_angles_and_have_a_manifold_surface(seed):
     rng = np.random.default_rng(seed)

@@ -64,6 +64,7 @@ def reloaded(result, folder, scene=None):
     return ms.load(folder / "result.npz", result.scene if scene is None else scene)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning", "ignore::magshell.MeshQualityWarning")
 @pytest.mark.parametrize("name", [name for name in MAKERS if name not in (*LINEAR_MAKERS, RESPONSES, FORCES)])
 def test_every_kind_of_scene(name, tmp_path):
     made = kind(name)

@@ -48,6 +48,7 @@ def rows():
                 yield pytest.param(name, k, bound, id=f"{name}: {quantity}")
 
 
+@pytest.mark.filterwarnings("ignore::magshell.UnitWarning")
 @pytest.mark.parametrize(("name", "k", "bound"), list(rows()))
 def test_error_is_below_its_bound(name: str, k: int, bound: float) -> None:
     comparison = outcome(name).comparisons[k]

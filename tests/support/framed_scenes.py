@@ -167,7 +167,7 @@ def with_added_mass(build: Build) -> None:
     f = build.frame
     sheet(build, clamped=False, velocity=_velocity)
     build.options["water"] = ms.Water(
-        f.density(800.0), drag_coefficient=0.0, thrust_coefficient=0.0, added_mass=0.6
+        f.density(800.0), drag_coefficient=0.0, thrust_coefficient=0.0, added_mass=f.scalar(0.6, -2, 1)
     )
 
 

@@ -231,6 +231,7 @@ def test_forces_and_hessian_products_of_fine_elements_agree_with_differences(kin
     assert product == pytest.approx(exact, abs=1e-7 * np.abs(exact).max())
 
 
+@pytest.mark.filterwarnings("ignore::magshell.FieldSamplingWarning")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("law", ["stretches", "rotates"])
 def test_equilibria_with_fine_elements_have_gradients_by_every_value(kind, law):

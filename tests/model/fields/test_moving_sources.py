@@ -335,6 +335,7 @@ def test_all_that_moves_at_once_from_checkpoints():
     assert np.array_equal(ms.equilibrium(alone, **MAGNETIZED).positions, before)
 
 
+@pytest.mark.filterwarnings("ignore::magshell.MeshQualityWarning", "ignore::magshell.StepErrorWarning")
 def test_gradients_through_a_step_that_was_taken_in_parts():
     """Check gradients by prescribed motions that are evaluated within a subdivided step."""
     ball, steps, time_step = ob.Sphere(0.004, center=(0.03, 0.01, -0.03)), 5, 1e-3

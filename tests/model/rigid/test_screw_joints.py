@@ -144,7 +144,7 @@ def test_gradients_of_a_train_of_screws(integrator):
 
         def along(one, k=k):
             given = [each.detach() for each in at]
-            return float(loss(*given[:k], torch.tensor(one, requires_grad=True), *given[k + 1 :]))
+            return loss(*given[:k], torch.tensor(one, requires_grad=True), *given[k + 1 :]).item()
 
         numbers = value.detach().numpy()
         long, short = (differences(along, np.array(numbers), step) for step in (2e-4, 1e-4))

@@ -69,7 +69,7 @@ def test_consistent_and_lumped_masses_give_frequencies_that_differ_by_the_mesh_e
     )
     first = np.argmax(lumped > 1e-6 * lumped.max())
     ratio = np.sqrt(consistent[first] / lumped[first])
-    coarse = scene.mesh.edge_lengths.max() / scene._bodies.extent
+    coarse = scene.mesh.edge_lengths.max() / np.ptp(scene.mesh.rest_positions, axis=0).max()
     assert 1.0 <= ratio <= 1.0 + MESH_ERROR * coarse**2
 
 

@@ -86,6 +86,7 @@ def references():
     return found
 
 
+@pytest.mark.filterwarnings("ignore::magshell.LargeStrainWarning")
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_order_in_time(references, name, law):

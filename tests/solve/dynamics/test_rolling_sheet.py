@@ -6,6 +6,8 @@ import pytest
 import magshell as ms
 from tests.support.rolling_sheet import TURN, half_travels, rolling_sheet, travel
 
+pytestmark = pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
+
 EULER = ms.ImplicitEuler()
 
 # The bounds of issue 32, of implicit Euler. Measured: 704, 845, 1040 and 1458; before the descent went downhill 2580, 2193,

@@ -250,6 +250,7 @@ def simulate_sliding(scene: ms.Scene, **options) -> np.ndarray:
     ).positions
 
 
+@pytest.mark.filterwarnings("ignore::magshell.StepErrorWarning")
 @pytest.mark.parametrize("call", [1, 2, 4, 9, 20, 40])
 def test_an_interrupted_motion_leaves_nothing_behind(monkeypatch, call):
     """Stop a motion that takes damped iterations only, which freeze the normal forces meanwhile.

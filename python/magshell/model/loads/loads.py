@@ -204,7 +204,14 @@ class EdgeCouple(Owner):  # plain-words: ok
                 "an EdgeCouple turns edges of a shell: a couple on a solid is one of PointLoads on its face"
             )
         edges, along = self._along(mesh)
-        return edges, along @ np.atleast_1d(self.couple_per_length)
+        couple = np.atleast_1d(self.couple_per_length)
+        moments = along @ couple
+        if np.linalg.norm(couple) > 0.0 and not (np.abs(moments) > 1e-12 * np.linalg.norm(along) * np.linalg.norm(couple)).any():
+            raise ValueError(
+                f"couple_per_length [N] of an EdgeCouple acts about the edges only, and {couple.tolist()} has no component along "
+                "them. A RigidBody of the edge's vertices with a torque twists it, or opposite EdgeLoads do"
+            )
+        return edges, moments
 
     def _add_numbers(self, label: str, values: Any, numbers: dict[Any, Any]) -> None:
         key, loaded = ("couples", "couples"), values.scene._moment_edges

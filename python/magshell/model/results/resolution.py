@@ -35,6 +35,7 @@ _SMOOTH = np.cos(np.radians(30.0))  # [-] of the largest angle between the norma
 _SAME = 1.01  # [-] ratio of thickness or Young's modulus across an edge, above which strains jump there
 _ROUND_OFF = 1e-9  # [-] strains below this are round-off
 _LEFT = 0.01  # [-] error fraction that the advised mesh should reach
+_SATURATES = 0.2  # [-] estimate above which the error may be larger, as the estimate does not exceed a third
 _MOST_NAMED = 4  # faces in a warning
 _ROWS, _COLUMNS = (0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)  # of a symmetric tensor's six components
 
@@ -80,11 +81,15 @@ def warn_of_resolution(
     )
     faces = ", ".join(map(str, np.argsort(-worst.by_face, kind="stable")[:_MOST_NAMED].tolist()))
     lengths = "" if of_membrane else _lengths_in_words(worst.body, values, flux_density)
+    number = values.scene._bodies.number(worst.body)
+    named = f"body {number}" if len(values.scene.bodies) > 1 else "the sheet"
+    as_much = "about as much" if fraction < _SATURATES else "at least as much"
     warnings.warn(
         ResolutionWarning(
-            f"{where}: the mesh of {worst.body!r:.80} is too coarse to resolve its {what} most at faces {faces}. An "
-            f"estimated {fraction:.0%} of its elastic energy is error, and displacements are off by about as much{lengths}. "
-            f"Take a mesh of six-node elements (`order=2`), or edges {np.sqrt(fraction / _LEFT):.2g} times shorter"
+            f"{where}: the mesh of {named} is too coarse to resolve its {what} most at faces {faces}. An "
+            f"estimated {fraction:.0%} of its elastic energy is error, and displacements are off by {as_much}{lengths}. "
+            "Take six-node elements (`order=2`, or ms.QuadraticTriangleMesh.from_triangles(mesh)), or edges "
+            f"{np.sqrt(fraction / _LEFT):.2g} times shorter, which leaves about {_LEFT:.0%}"
         ),
         stacklevel=callers_level(),
     )

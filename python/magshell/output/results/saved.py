@@ -250,7 +250,9 @@ def _fields(result, scene: Scene) -> dict[Any, Any]:
         return {"_cases": [_fields(case, scene) for case in result]}
     numbers = {id(each): k for k, each in enumerate((scene, *scene.objects))}
     held = {
-        _IN_FILES.get(name, name): value for name, value in result.__getstate__().items() if name != "scene"
+        _IN_FILES.get(name, name): value
+        for name, value in result.__getstate__().items()
+        if name not in ("scene", "_balance")
     }
     for name in ("replaced", "paths"):
         if name in held["_values"]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _OF_FLIGHT = 0.01  # [-] of a kinetic energy that counts as moved though it stays the same
 LARGEST_REST = 0.05  # [-] of the largest energy that moved; see test_rest_of_a_coarse_motion_is_warned_of
 
-_ROUND_OFF = 1e-12  # [-] of the largest row; see test_fixed_supports_have_impulses_and_no_work
+_ROUND_OFF = 1e-9  # [-] of the largest row; see test_fixed_supports_have_impulses_and_no_work
 
 # Kinds of terms whose forces count as work done on the scene; the others count as energies that the scene stores.
 _WORK = {
