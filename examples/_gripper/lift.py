@@ -35,7 +35,6 @@ def closing_and_lift(gripper: Gripper, remanent_magnetization: np.ndarray, steps
         support_factor=share**2 * (3 - 2 * share),
         values={gripper.sheet: {"remanent_magnetization": remanent_magnetization}},
         stiffness_damping=2e-3,
-        integrator=ms.ImplicitEuler(),  # nothing rebounds, so one solve a step suffices
         progress=False,
     )
     seconds = time.process_time() - began

@@ -184,7 +184,9 @@ class _Tangent(torch.autograd.Function):
         return looped(_Tangent, info.batch_size, in_dims, inputs)
 
 
-def looped(function: Any, count: int, in_dims: tuple[Any, ...], inputs: tuple[Any, ...]):
+def looped(
+    function: Any, count: int, in_dims: tuple[Any, ...], inputs: tuple[Any, ...]
+) -> tuple[tuple[torch.Tensor, ...], tuple[int, ...]]:
     """Apply a function to each member of a batch, and stack the results."""
     found = [
         function.apply(
