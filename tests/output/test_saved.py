@@ -282,3 +282,14 @@ def test_the_end_of_a_motion_is_data_for_a_multistart(tmp_path):
     held = to_plain(move.end, arrays, "the end")
     again = from_plain(json.loads(json.dumps(held)), arrays.__getitem__)
     assert again.clock == move.end.clock and same(again.state, move.end.state)
+
+
+def test_a_motion_whose_balance_was_asked_for_is_saved(tmp_path):
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6, mass_density=2e3)
+    scene = ms.Scene(sheet, supports=[ms.Clamp(mesh.edges_at(x=0.0))], gravity=(0, 0, -9.81))
+    move = ms.simulate(scene, steps=4, time_step=1e-3, progress=False)
+    move.balance()
+    ms.save(tmp_path / "move.npz", move)
+    again = ms.load(tmp_path / "move.npz", scene)
+    assert np.array_equal(again.positions, move.positions)

@@ -92,3 +92,15 @@ HEAVY = ms.Scene([A, B], supports=HELD, gravity=(0, 0, -1))
 def test_scenes_of_several_sheets_refuse_bad_input(act, words):
     with pytest.raises(ValueError, match=words):
         act()
+
+
+def test_a_couple_across_its_edges_is_refused():
+    mesh = ms.meshes.rectangle(0.04, 0.01, cells=(4, 1))
+    sheet = ms.Shell(mesh, thickness=1e-3, young_modulus=1e6)
+    supports = [ms.Clamp(mesh.edges_at(x=0.0))]
+    with pytest.raises(ValueError, match=r"has no component along them\. A RigidBody"):
+        ms.equilibrium(
+            ms.Scene(sheet, supports=supports, loads=[ms.EdgeCouple(mesh.edges_at(x=0.04), (1e-2, 0, 0))])
+        )
+    zero = ms.EdgeCouple(mesh.edges_at(x=0.04), (0, 0, 0))
+    assert ms.equilibrium(ms.Scene(sheet, supports=supports, loads=[zero])).stable

@@ -19,6 +19,8 @@ from ..solids.solid import Solid
 if TYPE_CHECKING:
     from ..._input.kinds import Numbers
 
+_ACROSS = 1e-12  # [-] component along the edges below which a couple is across all of them
+
 
 class DeadLoad(Owner):
     """Forces that keep their size and direction: a value times the length, area or number of some parts of the mesh.
@@ -206,10 +208,10 @@ class EdgeCouple(Owner):  # plain-words: ok
         edges, along = self._along(mesh)
         couple = np.atleast_1d(self.couple_per_length)
         moments = along @ couple
-        if np.linalg.norm(couple) > 0.0 and not (np.abs(moments) > 1e-12 * np.linalg.norm(along) * np.linalg.norm(couple)).any():
+        if couple.any() and np.abs(moments).max() <= _ACROSS * np.linalg.norm(along) * np.linalg.norm(couple):
             raise ValueError(
-                f"couple_per_length [N] of an EdgeCouple acts about the edges only, and {couple.tolist()} has no component along "
-                "them. A RigidBody of the edge's vertices with a torque twists it, or opposite EdgeLoads do"
+                f"couple_per_length [N] of an EdgeCouple acts about the edges only, and {couple.tolist()} has no component "
+                "along them. A RigidBody of the edge's vertices with a torque twists it, or opposite EdgeLoads do"
             )
         return edges, moments
 
