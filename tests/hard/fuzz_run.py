@@ -61,7 +61,8 @@ class TooLong(BaseException):
 def documented(call: Call, error: BaseException) -> bool:
     """Return whether the documentation names this error for bad input."""
     if isinstance(error, OSError):
-        return "path" in call.arguments or "checkpoint" in call.arguments or call.name == "StoredStudy"
+        named = {"path", "checkpoint", "source"} & set(call.arguments)
+        return bool(named) or call.name == "StoredStudy"
     if isinstance(error, ImportError):
         return call.name in ("MagpylibField", "read_mesh", "read_fields", "write_mesh", "show", "write_usd")
     if isinstance(error, FloatingPointError):
