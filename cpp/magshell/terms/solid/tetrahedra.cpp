@@ -207,6 +207,14 @@ auto Tetrahedra<Element>::along_strains(const Strains& strains) -> Rates {
 }
 
 template <class Element>
+void Tetrahedra<Element>::respond_to(const Rates& rates, Index group, const double* q, SimdMat3 f[points],
+                                     SimdMat3 along[points], PointResponse out[points]) const {
+    gradients_of(group, q, f);
+    rates(group, f, along);
+    respond(group, f, along, out);
+}
+
+template <class Element>
 void Tetrahedra<Element>::vjp(const double* q, const LoadParameters&, const double* lambda, Gradient& out) {
     if (!frozen_) add_work_vjp(q, along_motion(lambda), out);
 }
@@ -242,9 +250,7 @@ void Tetrahedra<Element>::add_work_rest_vjp(const double* q, const Rates& rates,
     add_rest(out, [&](Index group, SimdMat3 by_deformation[points]) {
         SimdMat3 f[points], along[points];
         PointResponse response[points];
-        gradients_of(group, q, f);
-        rates(group, f, along);
-        respond(group, f, along, response);
+        respond_to(rates, group, q, f, along, response);
         for (int p = 0; p < points; ++p) {
             const auto& [piola, rate, volume_excess] = response[p];
             SimdMat3& by = by_deformation[p];
@@ -273,9 +279,7 @@ Strains Tetrahedra<Element>::stress_rates(const double* q, const Rates& rates) c
     loop_.each_group([&](Index group) {
         SimdMat3 f[points], along[points];
         PointResponse response[points];
-        gradients_of(group, q, f);
-        rates(group, f, along);
-        respond(group, f, along, response);
+        respond_to(rates, group, q, f, along, response);
         for (int p = 0; p < points; ++p) {
             const SimdMat3 cofactors = cofactor(f[p]);
             const SimdDouble inverse = SimdDouble(1.0) / determinant(f[p], cofactors);

@@ -196,6 +196,9 @@ class Tetrahedra : public SolidTerm, public ElementEnergies, public RestShapeTer
     // Returns the rates along a motion of the nodes, and the rates L = F^-T c of strains c.
     Rates along_motion(const double* motion) const;
     static Rates along_strains(const Strains& strains);
+    // Computes F at q, the rates there, and the responses to them.
+    void respond_to(const Rates& rates, Index group, const double* q, SimdMat3 f[points],
+                    SimdMat3 along[points], PointResponse out[points]) const;
     // Returns the rates V S' of the second Piola-Kirchhoff stresses times volumes, S = F^-1 P.
     Strains stress_rates(const double* q, const Rates& rates) const;
     // Adds the derivatives of the power by rest positions.

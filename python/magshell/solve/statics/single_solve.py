@@ -221,10 +221,10 @@ def solve(
         scene, positions, inputs.values.all_shells, result._energies.get("bending", 0.0), "this equilibrium"
     )
     warn_if_large(result, result._largest_strains, "the equilibrium")
-    _check_resolution(inputs.values, found)
     layout = scene._load_parameter_layout
     field_factor = float(layout.of(found.load_parameters, "scene", "field_factor")[0])
     flux_density = layout.of(found.load_parameters, "scene", "applied_flux_density")[0]
+    _check_resolution(inputs.values, found.state, flux_density)
     at = (inputs.values, positions, field_factor, flux_density)
     try:  # Ctrl-C may arrive in a field that is a Python function of the caller
         if is_suspect(found.field_sampling_error):
@@ -239,16 +239,13 @@ def solve(
     return Solution(result, found, inputs)
 
 
-def _check_resolution(values: Values, found: _core.StaticsResult) -> None:
+def _check_resolution(values: Values, state: np.ndarray, flux_density: np.ndarray) -> None:
     """Warn of a mesh that is too coarse, in the first, the second, the fourth, ... equilibrium of a scene."""
     scene = values.scene
     count = scene._n_equilibria + 1
     remember(scene, _n_equilibria=count)
     if count & (count - 1) == 0:
-        flux_density = scene._load_parameter_layout.of(
-            found.load_parameters, "scene", "applied_flux_density"
-        )[0]
-        warn_of_resolution(unresolved(values, found.state), values, flux_density, "this equilibrium")
+        warn_of_resolution(unresolved(values, state), values, flux_density, "this equilibrium")
 
 
 def _with_fine_faces_at_end(
